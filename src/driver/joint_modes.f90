@@ -1,7 +1,7 @@
 !> Modes of a structure with its joint in three linear states: free (no contact at all), sliding
 !> (held along the normals) and stuck (held in every direction).
 module fw_joint_modes
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_formed_stiffness, only: harmonic_load
    use fw_kinds, only: wp
    use fw_modes, only: find_modes, mode_type
@@ -37,7 +37,7 @@ contains
 
    !> Modes within a range of frequencies; none of a structure that is too large.
    subroutine find_joint_modes(case, range, modes)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       !> [rad/s]
       real(wp), intent(in) :: range(2)
       type(joint_mode_type), allocatable, intent(out) :: modes(:)
@@ -59,7 +59,7 @@ contains
 
    !> Whether loads of a harmonic are looked at: the first always, others where some act.
    pure logical function is_loaded(case, n)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: n
 
       is_loaded = n == 1
@@ -70,7 +70,7 @@ contains
    !> Modes that the load of a harmonic hits, at the frequencies of the first harmonic where it
    !> does.
    subroutine add_modes_of(case, state, n, stiffness, range, modes)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: state, n
       !> Of a structure that is not cyclic.
       real(wp), allocatable, intent(in) :: stiffness(:, :)
@@ -121,7 +121,7 @@ contains
 
    !> Whether a state holds more than the one before.
    pure logical function differs(case, state)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: state
 
       differs = .true.
@@ -137,7 +137,7 @@ contains
 
    !> The stiffness with linear springs and with what the contact holds.
    subroutine held_stiffness(case, state, stiffness)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: state
       real(wp), allocatable, intent(out) :: stiffness(:, :)
       class(pair_law), allocatable :: law

@@ -7,7 +7,7 @@
 !> flank has the height A w/(2 d) at the distance d, whatever the damping: load over 2 omega times
 !> modal mass. Two rows hide a resonance between them only where they stand above its flank.
 module fw_mixed_bands
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_joint_modes, only: held_stiffness, joint_mode_type, state_free, state_sliding, &
       state_stuck
    use fw_kinds, only: wp
@@ -38,7 +38,7 @@ contains
 
    !> The bands of all modes; none where no pair opens.
    subroutine find_bands(case, modes, bands)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       !> All below the end of the range.
       type(joint_mode_type), intent(in) :: modes(:)
       type(mixed_band), allocatable, intent(out) :: bands(:)
@@ -76,7 +76,7 @@ contains
    !> Modes of the free structure at zero frequency, which are not in the list: held ones stand
    !> above free ones of the same number.
    integer function count_floating(case, free, held) result(n)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       !> Frequencies [rad/s].
       real(wp), intent(in) :: free(:), held(:)
       real(wp), parameter :: round_off = 1.0e-6_wp

@@ -3,7 +3,7 @@
 !> in each nodal diameter, of any other in nodal diameter 0 alone.
 module fw_natural_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hermitian, only: congruence, is_regular, solve_hermitian_eigen
@@ -39,7 +39,7 @@ contains
 
    !> The lowest frequencies of every nodal diameter that the model holds, or of some.
    subroutine find_natural_modes(case, n_modes, modes, error, wanted)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       !> Frequencies of each nodal diameter.
       integer, intent(in) :: n_modes
       type(natural_modes), intent(out) :: modes
@@ -78,7 +78,7 @@ contains
 
    !> Of a signed nodal diameter, damping included.
    subroutine find_waves(case, place, modes, error)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: place
       type(natural_modes), intent(inout) :: modes
       type(error_type), allocatable, intent(out) :: error
@@ -128,7 +128,7 @@ contains
    end subroutine list_waves
 
    subroutine find_in_diameter(case, k, open, closed, error)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: k
       real(wp), intent(inout) :: open(:), closed(:)
       type(error_type), allocatable, intent(out) :: error
@@ -159,7 +159,7 @@ contains
 
    !> Springs that are linear.
    subroutine add_springs(case, k, stiffness)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: k
       complex(wp), intent(inout) :: stiffness(:, :)
       complex(wp), allocatable :: rows(:, :)
@@ -177,7 +177,7 @@ contains
 
    !> Elastic pairs as springs; of all others the rows that they hold.
    subroutine close_pairs(case, k, stiffness, held)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: k
       complex(wp), intent(inout) :: stiffness(:, :)
       complex(wp), allocatable, intent(out) :: held(:, :)

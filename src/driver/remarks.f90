@@ -89,7 +89,7 @@ contains
          call case%contact%constants%first_unused(name)
          if (len_trim(name) > 0) call remarks%add('constant not used', &
             'the model gives contact%'//trim(name)//', which contact%law = '// &
-            law_text(case%contact)//' does not take')
+            trim(law_text(case%contact))//' does not take')
       end if
       ! A mode has none.
       if (.not. (is_shaken(case) .or. analyses(case%analysis)%is_free)) then
@@ -172,7 +172,7 @@ contains
       integer :: solved
 
       associate (contact => case%contact)
-         word = law_text(contact)
+         word = trim(law_text(contact))
          if (contact%law_is_chosen) then
             call remarks%add('law chosen', 'nothing was said of contact%law: rigid friction '// &
                'is taken, by '//word//trim(why_not_rigid(case)))

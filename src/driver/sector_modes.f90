@@ -1,7 +1,7 @@
 !> Modes of a cyclic structure in the nodal diameter of its first harmonic, with its joint in a
 !> linear state: what fw_joint_modes finds of other structures.
 module fw_sector_modes
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type
    use fw_hermitian, only: is_regular, solve_hermitian_eigen
@@ -24,7 +24,7 @@ contains
 
    !> The modes with frequencies within a range; none where the pencil has no solution.
    subroutine find_sector_modes(case, harmonic, first_component, range, modes)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       !> Of which the loads act, in its nodal diameter.
       integer, intent(in) :: harmonic
       !> Components of the pairs from this one on are held; 4: none.
@@ -99,7 +99,7 @@ contains
 
    !> Where waves in both directions differ: those the way of the harmonic.
    subroutine find_waves(case, nodal, harmonic, range, modes)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       type(nodal_matrices), intent(in) :: nodal
       integer, intent(in) :: harmonic
       real(wp), intent(in) :: range(2)
@@ -140,7 +140,7 @@ contains
 
    !> Linear springs, and what the contact holds.
    subroutine hold_joint(case, k, first_component, stiffness)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: k, first_component
       complex(wp), intent(inout) :: stiffness(:, :)
       class(pair_law), allocatable :: law

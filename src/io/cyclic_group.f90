@@ -1,6 +1,6 @@
 !> What a result file says of sectors and of natural frequencies.
 module fw_cyclic_group
-   use fw_case, only: analyses, case_type
+   use fw_cyclic_data, only: cyclic_type
    use fw_kinds, only: wp
    use fw_result_group, only: group_writer, result_group
    implicit none (type, external)
@@ -23,21 +23,21 @@ contains
 
    !> Sectors, engine order, and the signed nodal diameter of every harmonic; nothing of a structure
    !> that is not cyclic.
-   subroutine write_cyclic(case, to)
-      type(case_type), intent(in) :: case
+   subroutine write_cyclic(cyclic, has_points, n_harmonics, to)
+      type(cyclic_type), intent(in) :: cyclic
+      !> Whether the result is of waves.
+      logical, intent(in) :: has_points
+      integer, intent(in) :: n_harmonics
       type(group_writer), intent(inout) :: to
       integer :: h
 
-      associate (cyclic => case%model%cyclic)
-         if (.not. cyclic%is_cyclic) return
-         call to%note('/', 'n_sectors', cyclic%n_sectors)
-         if (.not. analyses(case%analysis)%has_points) return
-         call to%note('/', 'engine_order', cyclic%engine_order)
-         if (cyclic%is_mistuned) call to%note('/', 'mistuned', 1)
-         call to%put('/cyclic/nodal_diameter', &
-                     [(cyclic%nodal_diameter(h), h=0, case%harmonics%n_harmonics)], '', &
-                     'harmonic', 'signed nodal diameter of each harmonic')
-      end associate
+      if (.not. cyclic%is_cyclic) return
+      call to%note('/', 'n_sectors', cyclic%n_sectors)
+      if (.not. has_points) return
+      call to%note('/', 'engine_order', cyclic%engine_order)
+      if (cyclic%is_mistuned) call to%note('/', 'mistuned', 1)
+      call to%put('/cyclic/nodal_diameter', [(cyclic%nodal_diameter(h), h=0, n_harmonics)], '', &
+                  'harmonic', 'signed nodal diameter of each harmonic')
    end subroutine write_cyclic
 
    subroutine write_modes(self, to)

@@ -59,10 +59,8 @@ module fw_hdf5_append
       procedure :: permute
       procedure :: close
       !> `call dataset%append(file, values, error)`: one row, of exactly the shape created.
-      generic :: append => append_real_0, append_real_1, append_real_2, append_real_3, &
-         append_integer, append_logical
-      procedure, private :: append_real_0, append_real_1, append_real_2, append_real_3
-      procedure, private :: append_integer, append_logical
+      generic :: append => append_real, append_integer, append_logical
+      procedure, private :: append_real, append_integer, append_logical
       !> One row of reals whose elements follow one another.
       procedure :: append_flat
       !> `call dataset%drain(file, error)`: write what waits.
@@ -289,42 +287,17 @@ contains
       self%id = -1_hid_t
    end subroutine close
 
-   !> One number a row.
-   subroutine append_real_0(self, file, values, error)
+   !> Numbers of a row, of any rank.
+   subroutine append_real(self, file, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
-      real(wp), intent(in) :: values
+      real(wp), intent(in), contiguous, target :: values(..)
       type(error_type), allocatable, intent(out) :: error
 
-      call self%append_flat(file, [integer ::], [values], error)
-   end subroutine append_real_0
-
-   subroutine append_real_1(self, file, values, error)
-      class(growing_dataset), intent(inout) :: self
-      type(hdf5_file), intent(in) :: file
-      real(wp), intent(in), contiguous :: values(:)
-      type(error_type), allocatable, intent(out) :: error
-
-      call self%append_flat(file, shape(values), values, error)
-   end subroutine append_real_1
-
-   subroutine append_real_2(self, file, values, error)
-      class(growing_dataset), intent(inout) :: self
-      type(hdf5_file), intent(in) :: file
-      real(wp), intent(in), contiguous :: values(:, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call self%append_flat(file, shape(values), values, error)
-   end subroutine append_real_2
-
-   subroutine append_real_3(self, file, values, error)
-      class(growing_dataset), intent(inout) :: self
-      type(hdf5_file), intent(in) :: file
-      real(wp), intent(in), contiguous :: values(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call self%append_flat(file, shape(values), values, error)
-   end subroutine append_real_3
+      call self%append_raw(file, shape(values), bytes_of(c_loc(values), &
+                                                         storage_size(0.0_wp)/8*size(values)), &
+                           error)
+   end subroutine append_real
 
    !> A row of any shape, its elements in their order in memory: h5py shows the dimensions reversed.
    subroutine append_flat(self, file, dims, values, error)

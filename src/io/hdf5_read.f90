@@ -1,6 +1,5 @@
-!> Reading datasets of real numbers, rank 0 to 4, and of integers, rank 0 to 2.
-!>
-!> The ranks differ in their allocation alone. Files come from others: type, rank and size are
+!> Reading datasets of real numbers and of integers: lists and matrices, or of any rank as flat
+!> arrays with their extents. Files come from others: type, rank and size are
 !> checked before anything is allocated (fw_hdf5_dataset), and arrays have the reversed order of
 !> dimensions.
 module fw_hdf5_read
@@ -16,35 +15,17 @@ module fw_hdf5_read
    public :: read_dataset
 
    !> `call read_dataset(file, name, values, error)`: values of any real or integer type in the
-   !> file are converted; the rank must agree; integers that do not fit are an error.
+   !> file are converted; the rank must agree; integers that do not fit are an error. With a rank
+   !> and extents, `call read_dataset(file, name, rank, dims, values, error)`, values are flat.
    interface read_dataset
-      module procedure read_real_0
       module procedure read_real_1
       module procedure read_real_2
-      module procedure read_real_3
-      module procedure read_real_4
-      module procedure read_integer_0
       module procedure read_integer_1
-      module procedure read_integer_2
+      module procedure read_flat_real
+      module procedure read_flat_integer
    end interface read_dataset
 
 contains
-
-   !> `values` is defined on every way out, 0 with an error.
-   subroutine read_real_0(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), intent(out) :: values
-      type(error_type), allocatable, intent(out) :: error
-      type(dataset_type) :: dataset
-      real(wp) :: found(1)
-
-      values = 0
-      call open_dataset(file, name, kind_real, 0, dataset, error)
-      if (allocated(error)) return
-      call fill_real(file, name, dataset, 1, found, error)
-      if (.not. allocated(error)) values = found(1)
-   end subroutine read_real_0
 
    !> Allocated only without an error in type, rank and size.
    subroutine read_real_1(file, name, values, error)
@@ -60,7 +41,7 @@ contains
       call fill_real(file, name, dataset, size(values), values, error)
    end subroutine read_real_1
 
-   !> Ranks 2 to 4 as rank 1, with the dimensions in the order of Fortran.
+   !> Rank 2 as rank 1, with the dimensions in the order of Fortran.
    subroutine read_real_2(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -74,48 +55,7 @@ contains
       call fill_real(file, name, dataset, size(values), values, error)
    end subroutine read_real_2
 
-   subroutine read_real_3(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), allocatable, intent(out) :: values(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
-      type(dataset_type) :: dataset
-
-      call open_dataset(file, name, kind_real, 3, dataset, error)
-      if (allocated(error)) return
-      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3)))
-      call fill_real(file, name, dataset, size(values), values, error)
-   end subroutine read_real_3
-
-   subroutine read_real_4(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), allocatable, intent(out) :: values(:, :, :, :)
-      type(error_type), allocatable, intent(out) :: error
-      type(dataset_type) :: dataset
-
-      call open_dataset(file, name, kind_real, 4, dataset, error)
-      if (allocated(error)) return
-      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3), dataset%dims(4)))
-      call fill_real(file, name, dataset, size(values), values, error)
-   end subroutine read_real_4
-
-   !> Integers as reals, rank by rank; see fill_integer for their range.
-   subroutine read_integer_0(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(out) :: values
-      type(error_type), allocatable, intent(out) :: error
-      type(dataset_type) :: dataset
-      integer :: found(1)
-
-      values = 0
-      call open_dataset(file, name, kind_integer, 0, dataset, error)
-      if (allocated(error)) return
-      call fill_integer(file, name, dataset, 1, found, error)
-      if (.not. allocated(error)) values = found(1)
-   end subroutine read_integer_0
-
+   !> Integers as reals; see fill_integer for their range.
    subroutine read_integer_1(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -129,18 +69,39 @@ contains
       call fill_integer(file, name, dataset, size(values), values, error)
    end subroutine read_integer_1
 
-   subroutine read_integer_2(file, name, values, error)
+   !> All elements one behind the other, with the extents in the order of Fortran.
+   subroutine read_flat_real(file, name, rank, dims, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
-      integer, allocatable, intent(out) :: values(:, :)
+      integer, intent(in) :: rank
+      integer, allocatable, intent(out) :: dims(:)
+      !> What it holds is given back first; null with an error.
+      real(wp), pointer, intent(inout) :: values(:)
       type(error_type), allocatable, intent(out) :: error
       type(dataset_type) :: dataset
 
-      call open_dataset(file, name, kind_integer, 2, dataset, error)
+      if (associated(values)) deallocate (values)
+      call open_dataset(file, name, kind_real, rank, dataset, error)
       if (allocated(error)) return
-      allocate (values(dataset%dims(1), dataset%dims(2)))
+      dims = int(dataset%dims(:rank))
+      allocate (values(product(dims)))
+      call fill_real(file, name, dataset, size(values), values, error)
+   end subroutine read_flat_real
+
+   subroutine read_flat_integer(file, name, rank, dims, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in) :: rank
+      integer, allocatable, intent(out) :: dims(:), values(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_integer, rank, dataset, error)
+      if (allocated(error)) return
+      dims = int(dataset%dims(:rank))
+      allocate (values(product(dims)))
       call fill_integer(file, name, dataset, size(values), values, error)
-   end subroutine read_integer_2
+   end subroutine read_flat_integer
 
    !> Fill an array of any rank, passed by its first element, and close the dataset.
    subroutine fill_real(file, name, dataset, n, values, error)

@@ -1,4 +1,4 @@
-!> Datasets of strings, rank 0 and 1.
+!> Datasets that are lists of strings.
 !>
 !> Read are all kinds of strings that fw_hdf5_string knows, written those of variable length.
 module fw_hdf5_text
@@ -14,102 +14,46 @@ module fw_hdf5_text
 
    public :: read_text, write_text
 
-   !> `call read_text(file, name, texts, error)`.
-   interface read_text
-      module procedure read_text_0
-      module procedure read_text_1
-   end interface read_text
-
-   !> `call write_text(file, name, texts, error)`.
-   interface write_text
-      module procedure write_text_0
-      module procedure write_text_1
-   end interface write_text
-
 contains
 
-   !> A scalar; not allocated with an error.
-   subroutine read_text_0(file, name, text, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      character(:), allocatable, intent(out) :: text
-      type(error_type), allocatable, intent(out) :: error
-      type(string_type), allocatable :: strings(:)
-
-      call read_strings(file, name, 0, strings, error)
-      if (.not. allocated(error)) call move_alloc(strings(1)%text, text)
-   end subroutine read_text_0
-
-   !> A list, one dimension long.
-   subroutine read_text_1(file, name, texts, error)
+   !> All strings of a list, in the order of the file.
+   subroutine read_text(file, name, texts, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
       type(string_type), allocatable, intent(out) :: texts(:)
       type(error_type), allocatable, intent(out) :: error
-
-      call read_strings(file, name, 1, texts, error)
-   end subroutine read_text_1
-
-   subroutine write_text_0(file, name, text, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name, text
-      type(error_type), allocatable, intent(out) :: error
-      type(string_type) :: strings(1)
-
-      ! Not by a structure constructor, whose text gfortran 12 does not free.
-      strings(1)%text = text
-      call write_strings(file, name, [integer ::], strings, error)
-   end subroutine write_text_0
-
-   subroutine write_text_1(file, name, texts, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      type(string_type), intent(in) :: texts(:)
-      type(error_type), allocatable, intent(out) :: error
-
-      call write_strings(file, name, shape(texts), texts, error)
-   end subroutine write_text_1
-
-   !> All strings of a dataset of a rank, in the order of the file.
-   subroutine read_strings(file, name, rank, strings, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(in) :: rank
-      type(string_type), allocatable, intent(out) :: strings(:)
-      type(error_type), allocatable, intent(out) :: error
       type(dataset_type) :: dataset
       integer :: status, ignored
 
-      call open_dataset(file, name, kind_string, rank, dataset, error)
+      call open_dataset(file, name, kind_string, 1, dataset, error)
       if (allocated(error)) return
-      call get_strings(dataset%id, .false., int(product(dataset%dims)), strings, status)
+      call get_strings(dataset%id, .false., int(product(dataset%dims)), texts, status)
       call h5dclose_f(dataset%id, ignored)
       if (status < 0) call dataset_failure(file, name, 'cannot be read (damaged file?)', error)
-   end subroutine read_strings
+   end subroutine read_text
 
-   !> A dataset and the groups above it; no dimensions make a scalar.
-   subroutine write_strings(file, name, dims, strings, error)
+   !> A list, and the groups above it.
+   subroutine write_text(file, name, texts, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
-      integer, intent(in) :: dims(:)
-      type(string_type), intent(in) :: strings(:)
+      type(string_type), intent(in) :: texts(:)
       type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: type_id, space, id
       integer :: status, ignored
 
       type_id = new_string_type()
-      space = new_space(dims)
+      space = new_space(shape(texts))
       call new_dataset(file, name, type_id, space, id, error)
       call h5sclose_f(space, ignored)
       status = 0
       ! An empty list is a dataset all the same.
-      if (size(strings) > 0 .and. .not. allocated(error)) then
-         call put_strings(id, type_id, .false., strings, status)
+      if (size(texts) > 0 .and. .not. allocated(error)) then
+         call put_strings(id, type_id, .false., texts, status)
       end if
       call h5tclose_f(type_id, ignored)
       if (allocated(error)) return
       call h5dclose_f(id, ignored)
       if (status < 0) call dataset_failure(file, name, 'cannot be written (disk full?)', error)
-   end subroutine write_strings
+   end subroutine write_text
 
 end module fw_hdf5_text

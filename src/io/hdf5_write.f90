@@ -1,4 +1,4 @@
-!> Writing datasets of real numbers, rank 0 to 4, and of integers, rank 0 to 2.
+!> Writing datasets of real numbers and of integers, of any rank.
 !>
 !> A dataset is written once and whole; what grows point by point is fw_hdf5_append's.
 module fw_hdf5_write
@@ -18,14 +18,8 @@ module fw_hdf5_write
    !> `call write_dataset(file, name, values, error)`: h5py shows the dimensions of `values`
    !> in reversed order. Groups on the way are created.
    interface write_dataset
-      module procedure write_real_0
-      module procedure write_real_1
-      module procedure write_real_2
-      module procedure write_real_3
-      module procedure write_real_4
-      module procedure write_integer_0
-      module procedure write_integer_1
-      module procedure write_integer_2
+      module procedure write_real
+      module procedure write_integer
    end interface write_dataset
 
 contains
@@ -92,101 +86,26 @@ contains
       if (status < 0) call dataset_failure(file, name, 'cannot be written (disk full?)', error)
    end subroutine write_dataset_raw
 
-   !> Every rank hands on its shape and its elements in their order in memory.
-   subroutine write_real_0(file, name, values, error)
+   !> Elements in their order in memory.
+   subroutine write_real(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
-      real(wp), intent(in) :: values
+      real(wp), intent(in), contiguous, target :: values(..)
       type(error_type), allocatable, intent(out) :: error
 
-      call put_real(file, name, [integer ::], [values], error)
-   end subroutine write_real_0
-
-   subroutine write_real_1(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), intent(in), contiguous :: values(:)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_real(file, name, shape(values), values, error)
-   end subroutine write_real_1
-
-   subroutine write_real_2(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), intent(in), contiguous :: values(:, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_real(file, name, shape(values), values, error)
-   end subroutine write_real_2
-
-   subroutine write_real_3(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), intent(in), contiguous :: values(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_real(file, name, shape(values), values, error)
-   end subroutine write_real_3
-
-   subroutine write_real_4(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), intent(in), contiguous :: values(:, :, :, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_real(file, name, shape(values), values, error)
-   end subroutine write_real_4
-
-   subroutine write_integer_0(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(in) :: values
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_integer(file, name, [integer ::], [values], error)
-   end subroutine write_integer_0
-
-   subroutine write_integer_1(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(in), contiguous :: values(:)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_integer(file, name, shape(values), values, error)
-   end subroutine write_integer_1
-
-   subroutine write_integer_2(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(in), contiguous :: values(:, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_integer(file, name, shape(values), values, error)
-   end subroutine write_integer_2
-
-   !> All elements in their order in memory, whatever the rank.
-   subroutine put_real(file, name, dims, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(in) :: dims(:)
-      real(wp), intent(in), target :: values(product(dims))
-      type(error_type), allocatable, intent(out) :: error
-
-      call write_dataset_raw(file, name, dims, h5kind_to_type(wp, h5_real_kind), &
+      call write_dataset_raw(file, name, shape(values), h5kind_to_type(wp, h5_real_kind), &
                              c_loc(values), error)
-   end subroutine put_real
+   end subroutine write_real
 
-   !> As put_real; 32 bits in the file too.
-   subroutine put_integer(file, name, dims, values, error)
+   !> As write_real; 32 bits in the file too.
+   subroutine write_integer(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
-      integer, intent(in) :: dims(:)
-      integer, intent(in), target :: values(product(dims))
+      integer, intent(in), contiguous, target :: values(..)
       type(error_type), allocatable, intent(out) :: error
 
-      call write_dataset_raw(file, name, dims, h5kind_to_type(kind(0), h5_integer_kind), &
+      call write_dataset_raw(file, name, shape(values), h5kind_to_type(kind(0), h5_integer_kind), &
                              c_loc(values), error)
-   end subroutine put_integer
+   end subroutine write_integer
 
 end module fw_hdf5_write

@@ -5,7 +5,7 @@ module fw_matrix_market
    use fw_error, only: error_type, fatal_error, status_input, status_io
    use fw_kinds, only: wp
    use fw_matrix_market_lines, only: line_reader
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_text, only: lower_case, string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
@@ -56,7 +56,7 @@ contains
       !> A prefix, a folder, or the path of one of the files.
       character(*), intent(in) :: path
       !> Only mass, stiffness, damping and the files are set.
-      type(file_model_type), intent(out) :: model
+      type(raw_model), intent(out) :: model
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: prefix
       integer :: n

@@ -5,13 +5,13 @@
 !> told; what the values must be (finite, symmetric) is checked with those of files later.
 module fw_memory_model
    use fw_contact_data, only: spring_type
-   use fw_error, only: error_type, fatal_error, status_failure, status_input, status_usage
+   use fw_cyclic_parts, only: check_physical, check_rows, cyclic_parts, finish_influence
+   use fw_error, only: error_type, fatal_error, status_input, status_usage
    use fw_kinds, only: i8, wp
-   use fw_memory_sectors, only: check_memory_sectors, is_sector_part, put_sector_integers, &
-      put_sector_reals
-   use fw_model_file, only: file_model_type
    use fw_part_names, only: meant_part
-   use fw_parts, only: is_of_kind, names_to_put, part_to_put, part_type
+   use fw_part_values, only: value_source
+   use fw_parts, only: keys_of_laws, names_to_put
+   use fw_raw_model, only: raw_model
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
@@ -27,7 +27,7 @@ module fw_memory_model
       !> Sizes that the parts must have.
       integer :: n_dof = 0
       integer :: n_pairs = 0
-      type(file_model_type) :: parts
+      type(raw_model) :: parts
    contains
       procedure :: start
       generic :: put => put_reals, put_integers, put_texts
@@ -59,137 +59,59 @@ contains
       end if
    end subroutine start
 
-   !> A real part, as a flat array: the matrices are symmetric, so that their order of storage
-   !> makes no difference; contact/position is (3, n_pairs) with the coordinate innermost.
+   !> A real part, as a flat array, row after row; symmetric matrices may stand in either order,
+   !> contact/position is (3, n_pairs) with the coordinate innermost.
    subroutine put_reals(self, name, values, error)
       class(memory_model_type), intent(inout) :: self
       !> The name of a dataset, such as 'load/cosine'.
       character(*), intent(in) :: name
-      real(wp), intent(in) :: values(:)
+      real(wp), intent(in), target, contiguous :: values(:)
       type(error_type), allocatable, intent(out) :: error
+      type(value_source) :: source
       character(:), allocatable :: message
-      type(part_type) :: part
-      integer :: rows, columns
+      integer :: k
 
-      call look_up(name, 'real', part, error)
-      if (allocated(error)) return
-      if (is_sector_part(name)) then
-         call put_sector_reals(name, values, self%n_dof, self%parts%cyclic, message)
-         if (allocated(message)) call fatal_error(error, name//' '//message, status_input)
-         return
-      end if
-      rows = self%n_dof
-      columns = 1
-      select case (part%shape)
-      case ('dof dof')
-         columns = self%n_dof
-      case ('load dof')
-         ! As many as there are harmonics, which may be given later.
-         columns = size(values)/rows
-      case ('one_or pair')
-         rows = self%n_pairs
-      case ('pair 3')
-         rows = 3
-         columns = self%n_pairs
-      case ('one_or spring')
-         ! Of any number: whether it fits the others is known when all are there.
-         self%parts%springs%coefficient = values
-         return
-      case default ! 'dof'
-         continue
-      end select
-      ! The product in 64 bits: n_dof**2 passes the range of 32.
-      call check_size(name, size(values, kind=i8), rows, columns, error)
-      if (allocated(error)) return
-      associate (parts => self%parts)
-         select case (name)
-         case ('mass')
-            call take_matrix(name, values, rows, parts%mass, error)
-         case ('stiffness')
-            call take_matrix(name, values, rows, parts%stiffness, error)
-         case ('damping')
-            call take_matrix(name, values, rows, parts%damping, error)
-         case ('stiffness_rotation')
-            call take_matrix(name, values, rows, parts%stiffness_rotation, error)
-         case ('coriolis')
-            ! Row after row, as in a file: the others are symmetric.
-            parts%coriolis = transpose(reshape(values, [rows, rows]))
-         case ('load/static')
-            parts%load_static = values
-         case ('load/cosine')
-            parts%load_cosine = values
-         case ('load/sine')
-            parts%load_sine = values
-         case ('load/static_rotation')
-            parts%load_static_rotation = values
-         case ('load/harmonic_cosine')
-            parts%harmonic_cosine = reshape(values, [rows, columns])
-         case ('load/harmonic_sine')
-            parts%harmonic_sine = reshape(values, [rows, columns])
-         case ('contact/mu')
-            parts%mu = values
-         case ('contact/gap')
-            parts%gap = values
-         case ('contact/area')
-            parts%area = values
-         case ('contact/normal_load')
-            parts%normal_load = values
-         case ('contact/position')
-            parts%position = reshape(values, [3, self%n_pairs])
-         case default
-            ! Of a law.
-            call parts%constants%offer(name(len('contact/') + 1:), values)
-         end select
-      end associate
+      source%reals => values
+      call take(self, name, 'real', size(values, kind=i8), source, error)
+      if (allocated(error) .or. .not. allocated(self%parts%cyclic%nodal)) return
+      self%parts%cyclic%n_physical = self%n_dof
+      do k = 1, size(self%parts%cyclic%nodal)
+         associate (nodal => self%parts%cyclic%nodal(k))
+            if (.not. allocated(nodal%mass)) cycle
+            call check_physical(self%n_dof, size(nodal%mass, 1), 'this matrix', message)
+            if (.not. allocated(message)) cycle
+            deallocate (nodal%mass)
+            call fatal_error(error, name//' does not fit n_dof, which '//message, status_input)
+            return
+         end associate
+      end do
    end subroutine put_reals
 
-   !> An integer part: the signed dof numbers (t1, t2, n) of a side, pair after pair, or the
-   !> harmonics of loads.
+   !> An integer part, in the order of a file: the signed dof numbers (t1, t2, n) of a side, pair
+   !> after pair.
    subroutine put_integers(self, name, values, error)
       class(memory_model_type), intent(inout) :: self
       character(*), intent(in) :: name
       integer, intent(in) :: values(:)
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: message
-      type(part_type) :: part
+      type(value_source) :: source
+      integer :: before
 
-      call look_up(name, 'integer', part, error)
-      if (allocated(error)) return
-      if (is_sector_part(name)) then
-         call put_sector_integers(name, values, self%n_pairs, self%parts%cyclic, message)
-         if (allocated(message)) call fatal_error(error, name//' '//message, status_input)
-         return
-      else if (index(name, 'spring/') == 1) then
-         call put_spring_integers(name, values, self%parts%springs)
-         return
-      end if
-      if (name == 'load/harmonic') then
-         if (any(values < 0)) then
-            call fatal_error(error, name//' has '//to_text(minval(values))//': must be 0, 1, ..', &
-                             status_input)
-            return
+      source%integers = values
+      associate (parts => self%parts%cyclic)
+         before = parts%n_sectors
+         call take(self, name, 'integer', size(values, kind=i8), source, error)
+         if (allocated(error) .or. name /= 'cyclic/n_sectors') return
+         if (parts%n_sectors < 1) then
+            call fatal_error(error, name//' is '//to_text(parts%n_sectors)//': must be at '// &
+                             'least 1', status_input)
+         else if (allocated(parts%nodal) .or. allocated(parts%air)) then
+            call fatal_error(error, name//' comes after nodal diameters or forces of the air: '// &
+                             'put it before them', status_input)
          end if
-         self%parts%load_harmonic = values
-         return
-      end if
-      call check_size(name, size(values, kind=i8), 3, self%n_pairs, error)
-      if (allocated(error)) return
-      ! Component innermost, as in a file that h5py shows as (n_pairs, 3).
-      if (name == 'contact/side_1') self%parts%side_1 = reshape(values, [3, self%n_pairs])
-      if (name == 'contact/side_2') self%parts%side_2 = reshape(values, [3, self%n_pairs])
+         if (allocated(error)) parts%n_sectors = before
+      end associate
    end subroutine put_integers
-
-   !> Dofs, sectors and powers of springs, whose number is checked when all are there.
-   subroutine put_spring_integers(name, values, springs)
-      character(*), intent(in) :: name
-      integer, intent(in) :: values(:)
-      type(spring_type), intent(inout) :: springs
-
-      if (name == 'spring/side_1') springs%side_1 = values
-      if (name == 'spring/side_2') springs%side_2 = values
-      if (name == 'spring/sector_2') springs%sector_2 = values
-      if (name == 'spring/power') springs%power = values
-   end subroutine put_spring_integers
 
    !> A text, or a list of them with one for each pair.
    subroutine put_texts(self, name, texts, error)
@@ -197,17 +119,45 @@ contains
       character(*), intent(in) :: name
       type(string_type), intent(in) :: texts(:)
       type(error_type), allocatable, intent(out) :: error
-      type(part_type) :: part
+      type(value_source) :: source
 
-      call look_up(name, 'text', part, error)
-      if (allocated(error)) return
-      call check_size(name, size(texts, kind=i8), 1, merge(self%n_pairs, 1, &
-                                                           name == 'contact/patch'), error)
-      if (allocated(error)) return
-      if (name == 'title') self%parts%title = texts(1)%text
-      if (name == 'unit_system') self%parts%unit_system = texts(1)%text
-      if (name == 'contact/patch') self%parts%patch = texts
+      source%texts = texts
+      call take(self, name, 'text', size(texts, kind=i8), source, error)
    end subroutine put_texts
+
+   !> Put the values of a source into the part of that name; an error where it has none of that
+   !> kind, with the names that there are.
+   subroutine take(self, name, kind, n_values, source, error)
+      class(memory_model_type), intent(inout) :: self
+      character(*), intent(in) :: name, kind
+      integer(i8), intent(in) :: n_values
+      type(value_source), intent(inout) :: source
+      type(error_type), allocatable, intent(out) :: error
+
+      logical :: had_diameters
+
+      had_diameters = allocated(self%parts%cyclic%nodal)
+      source%name = name
+      source%kind = kind
+      source%n_values = n_values
+      source%stands_by_rows = .false.
+      ! Functions of texts serve one thread at a time.
+      !$omp critical (fretwear_io)
+      source%constants = keys_of_laws()
+      call source%set_extent('dof', self%n_dof)
+      call source%set_extent('pair', self%n_pairs)
+      call self%parts%bind_parts(source)
+      call move_alloc(source%error, error)
+      if (.not. (source%is_taken .or. allocated(error))) then
+         ! The name may have begun as that of a nodal diameter.
+         if (allocated(self%parts%cyclic%nodal) .and. .not. had_diameters) then
+            deallocate (self%parts%cyclic%nodal)
+         end if
+         call fatal_error(error, "'"//name//"' is no "//kind//' part of a model: must be one '// &
+                          'of '//names_to_put(kind)//meant_part(name), status_usage)
+      end if
+      !$omp end critical (fretwear_io)
+   end subroutine take
 
    !> Add an observed quantity: a linear combination of the dofs (n_dof).
    subroutine observe(self, name, row, error)
@@ -274,9 +224,9 @@ contains
       associate (parts => self%parts)
          n_names = 0
          if (allocated(parts%observe_name)) n_names = size(parts%observe_name)
-         call check_memory_sectors(self%n_dof, n_names, allocated(parts%observe_matrix), &
-                                   allocated(parts%mass) .or. allocated(parts%stiffness), &
-                                   parts%cyclic, message)
+         call check_sectors(self%n_dof, n_names, allocated(parts%observe_matrix), &
+                            allocated(parts%mass) .or. allocated(parts%stiffness), parts%cyclic, &
+                            message)
          if (allocated(message)) then
             call fatal_error(error, message, status_input)
             return
@@ -286,13 +236,15 @@ contains
             if (.not. allocated(parts%stiffness)) missing = 'stiffness'
          end if
       end associate
-      if (self%n_pairs > 0 .and. .not. allocated(self%parts%side_1)) missing = 'contact/side_1'
-      if (len(missing) > 0) then
-         call fatal_error(error, 'the model in memory lacks '//missing, status_input)
-      else if (self%n_pairs > 0 .and. .not. allocated(self%parts%side_2)) then
-         ! Everything against the ground.
-         allocate (self%parts%side_2(3, self%n_pairs), source=0)
-      end if
+      associate (contact => self%parts%contact)
+         if (self%n_pairs > 0 .and. .not. allocated(contact%side_1)) missing = 'contact/side_1'
+         if (len(missing) > 0) then
+            call fatal_error(error, 'the model in memory lacks '//missing, status_input)
+         else if (self%n_pairs > 0 .and. .not. allocated(contact%side_2)) then
+            ! Everything against the ground.
+            allocate (contact%side_2(3, self%n_pairs), source=0)
+         end if
+      end associate
       if (.not. allocated(error)) call check_waves(self%parts, error)
       if (.not. allocated(error)) call count_springs(self%parts%springs, error)
    end subroutine check
@@ -328,7 +280,7 @@ contains
 
    !> Loads of harmonics have one column for each of these.
    subroutine check_waves(parts, error)
-      type(file_model_type), intent(in) :: parts
+      type(raw_model), intent(in) :: parts
       type(error_type), allocatable, intent(out) :: error
       integer :: n
 
@@ -352,27 +304,6 @@ contains
 
    end subroutine check_waves
 
-   !> Column by column, since reshape would copy the whole once more; n_dof**2 values were checked.
-   subroutine take_matrix(name, values, order, matrix, error)
-      character(*), intent(in) :: name
-      real(wp), intent(in) :: values(:)
-      integer, intent(in) :: order
-      real(wp), allocatable, intent(inout) :: matrix(:, :)
-      type(error_type), allocatable, intent(out) :: error
-      integer :: j, status
-
-      if (allocated(matrix)) deallocate (matrix)
-      allocate (matrix(order, order), stat=status)
-      if (status /= 0) then
-         call fatal_error(error, name//': no memory for a matrix of order '//to_text(order), &
-                          status_failure)
-         return
-      end if
-      do j = 1, order
-         matrix(:, j) = values((j - 1_i8)*order + 1:j*int(order, i8))
-      end do
-   end subroutine take_matrix
-
    !> Refuse another number of values than the part has.
    subroutine check_size(name, n_given, rows, columns, error)
       character(*), intent(in) :: name
@@ -388,20 +319,74 @@ contains
                        status_input)
    end subroutine check_size
 
-   !> The row of the table for a name; an error that says which names there are.
-   subroutine look_up(name, kind, part, error)
-      character(*), intent(in) :: name, kind
-      type(part_type), intent(out) :: part
-      type(error_type), allocatable, intent(out) :: error
+   !> What the parts must be to each other once all are there.
+   subroutine check_sectors(n_dof, n_names, has_rows, has_sector, parts, message)
+      integer, intent(in) :: n_dof
+      !> Observed quantities; rows of the displacements go with them.
+      integer, intent(in) :: n_names
+      logical, intent(in) :: has_rows
+      !> Whether there are matrices of a sector.
+      logical, intent(in) :: has_sector
+      type(cyclic_parts), intent(inout) :: parts
+      !> What is wrong; not allocated where nothing is.
+      character(:), allocatable, intent(out) :: message
+      integer :: n_left, n_right
 
-      ! Functions of texts serve one thread at a time.
-      !$omp critical (fretwear_io)
-      part = part_to_put(name)
-      if (.not. is_of_kind(part, kind)) then
-         call fatal_error(error, "'"//name//"' is no "//kind//' part of a model: must be one '// &
-                          'of '//names_to_put(kind)//meant_part(name), status_usage)
+      n_left = 0
+      n_right = 0
+      if (allocated(parts%left)) n_left = size(parts%left)
+      if (allocated(parts%right)) n_right = size(parts%right)
+      if (n_left /= n_right) then
+         message = 'cyclic/left and cyclic/right have '//to_text(n_left)//' and '// &
+                   to_text(n_right)//' dofs: must be as many'
+         return
       end if
-      !$omp end critical (fretwear_io)
-   end subroutine look_up
+      if (allocated(parts%nodal)) then
+         call check_diameters(n_names, has_rows, has_sector, parts, message)
+      else if (n_names > 0 .and. .not. has_rows) then
+         message = 'observed quantities have names and no rows: give n_dof factors for each'
+      end if
+      if (allocated(message) .or. .not. allocated(parts%air)) return
+      if (.not. allocated(parts%air%number)) then
+         message = 'aero/modes comes without aero/sector/M or aero/nodal_diameter/M'
+         return
+      end if
+      call finish_influence(parts%air, n_dof, message)
+      if (allocated(message)) message = 'matrices of the air '//message
+   end subroutine check_sectors
+
+   subroutine check_diameters(n_names, has_rows, has_sector, parts, message)
+      integer, intent(in) :: n_names
+      logical, intent(in) :: has_rows, has_sector
+      type(cyclic_parts), intent(in) :: parts
+      character(:), allocatable, intent(out) :: message
+      logical :: has_own
+      integer :: k
+
+      if (has_sector) then
+         message = 'mass or stiffness stands beside matrices of nodal diameters: must be one '// &
+                   'of both'
+         return
+      end if
+      has_own = .false.
+      do k = 0, size(parts%nodal) - 1
+         has_own = has_own .or. allocated(parts%nodal(k + 1)%observe)
+         if (.not. allocated(parts%nodal(k + 1)%mass)) cycle
+         if (allocated(parts%nodal(k + 1)%stiffness)) cycle
+         message = 'the model in memory lacks '//'nodal_diameter/'//to_text(k)//'/stiffness'
+         return
+      end do
+      if (has_own .and. has_rows) then
+         message = 'rows of observed quantities stand with the nodal diameters: give their '// &
+                   'names without factors'
+      else if (n_names > 0 .and. .not. has_rows) then
+         call check_rows(parts, n_names, k)
+         if (k >= 0) message = 'nodal_diameter/'//to_text(k)//'/observe/matrix must have a row '// &
+                               'for each of the '//to_text(n_names)//' observed quantities'
+      else if (has_own) then
+         message = 'rows of nodal diameters observe quantities without names: give these, '// &
+                   'without factors'
+      end if
+   end subroutine check_diameters
 
 end module fw_memory_model

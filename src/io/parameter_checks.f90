@@ -10,15 +10,18 @@ module fw_parameter_checks
    use fw_model, only: model_type
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient, harmonic_scale, is_of_matrices, is_per_pair, &
-      is_per_spring, normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, &
-      parameter_key, parameter_words, parameters, positive, rotation_speed, static_scale, &
-      tangential_stiffness
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
+      is_per_pair, is_per_spring, normal_load, normal_stiffness, not_negative, of_closing, &
+      of_pressed, of_sliding, parameter_key, parameter_words, parameters, positive, &
+      rotation_speed, static_scale, tangential_stiffness
+   use fw_solver_options, only: continuation_natural
    use fw_values, only: number_text
    implicit none (type, external)
    private
 
    public :: check_parameter, check_parameter_sweep, pairs_of
+
+   character(*), parameter :: swept = 'sweep%parameter'
 
 contains
 
@@ -41,6 +44,9 @@ contains
          call check_of_matrices(case, number, reason)
       else
          call check_of_loads(case%model, number, reason)
+      end if
+      if (.not. (parameters(number)%has_slope .or. asked_by == swept)) then
+         reason = 'its derivative is not known'
       end if
       if (.not. allocated(reason)) return
       call fatal_error(error, asked_by//" = '"//trim(parameter_words(number))//"': "//reason// &
@@ -85,13 +91,14 @@ contains
          reason = 'there are no contact pairs: give group &contact'
          return
       end if
-      if (any(number == [tangential_stiffness, normal_stiffness])) then
+      if (all(number /= [friction_coefficient, normal_load, gap])) then
          call parameter_key(number, key)
-         if (all(pairs_are_rigid(contact))) then
-            reason = 'contact%law = '//law_text(contact)//' is rigid: its eps is a'// &
+         if (all(pairs_are_rigid(contact)) .and. any(number == [tangential_stiffness, &
+                                                                normal_stiffness])) then
+            reason = 'contact%law = '//trim(law_text(contact))//' is rigid: its eps is a'// &
                      ' number of the method, on which exact solutions do not depend'
          else if (.not. contact%constants%is_of_law(laws_of(contact), key)) then
-            reason = 'contact%law = '//law_text(contact)//' has no '//trim(key)
+            reason = 'contact%law = '//trim(law_text(contact))//' has no '//trim(key)
          end if
       end if
       if (number == friction_coefficient .and. (contact%constants%has('mu_dynamic') .or. &
@@ -141,8 +148,16 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. case%over%is_wanted()) return
-      call check_parameter(case, case%over%number, 'sweep%parameter', error)
-      if (.not. allocated(error)) call check_values(case, error)
+      call check_parameter(case, case%over%number, swept, error)
+      if (allocated(error)) return
+      if (.not. parameters(case%over%number)%has_slope .and. &
+          case%sweep%continuation /= continuation_natural) then
+         call fatal_error(error, swept//" = '"//trim(parameter_words(case%over%number))// &
+                          "': its derivative is not known; use continuation = 'natural'", &
+                          status_input)
+         return
+      end if
+      call check_values(case, error)
    end subroutine check_parameter_sweep
 
    !> Values that the parameter can take: one for all pairs (springs), in its range.

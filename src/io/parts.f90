@@ -1,151 +1,71 @@
-!> The parts of a model file: a row each, with what it is, its shape and its meaning. What reads,
-!> refuses and lists parts goes by this table; the constants of contact laws are those that the laws
-!> declare in their `bind_keys`.
+!> The list of the parts of a model, as `bind_parts` of fw_raw_model declares them: what refuses and
+!> lists parts goes by it. The constants of contact laws are those that the laws declare in their
+!> `bind_keys`.
 module fw_parts
    use fw_contact_data, only: contact_type
    use fw_contact_keys, only: ask_laws
    use fw_key, only: key_type
+   use fw_part, only: part_source, part_type
+   use fw_raw_model, only: raw_model
    use fw_reader, only: reader_type
    implicit none (type, external)
    private
 
-   public :: part_type, is_of_kind, law_constant_names, model_parts, names_to_put, part_to_put, &
-             put_name, write_parts
+   public :: is_of_kind, keys_of_laws, model_parts, names_to_put, part_type, put_name, &
+             write_parts
 
-   type :: part_type
-      !> Path from the root. K stands for a nodal diameter, M for the number of a sector or of a
-      !> signed nodal diameter; what follows a @ is an attribute of the group before it.
-      character(40) :: name
-      !> Of the numbers: complex ones have real and imaginary part in one more dimension.
-      character(7) :: kind
-      !> Extents as h5py shows them, in words; `one_or` before them: a scalar holds for all.
-      character(20) :: shape
-      !> Blank: may be absent.
-      character(32) :: needed
-      character(150) :: meaning
-   end type part_type
-
-   character(*), parameter :: with_pairs = 'with /contact', with_springs = 'with /spring', &
-      with_mesh = 'with /mesh'
-
-   type(part_type), parameter :: of_structure(*) = [ &
-      part_type('@format', 'text', '', 'required', '"fretwear-model"'), &
-      part_type('@format_version', 'integer', '', 'required', '1'), &
-      part_type('@title', 'text', '', '', 'of the result, where the case has none'), &
-      part_type('@unit_system', 'text', '', '', &
-                'such as mm-tonne-s-N: units of the result and of values with units'), &
-      part_type('@parameters', 'text', '', '', 'what python -m fretwear.sector made it from'), &
-      part_type('@disk_parameters', 'text', '', '', 'what python -m fretwear.disk made it from'), &
-      part_type('mass', 'real', 'dof dof', 'required', 'symmetric'), &
-      part_type('stiffness', 'real', 'dof dof', 'required', 'symmetric'), &
-      part_type('damping', 'real', 'dof dof', '', 'viscous, symmetric'), &
-      part_type('stiffness_rotation', 'real', 'dof dof', '', &
-                'added to the stiffness for each (rad/s)^2 of model%rotation_speed'), &
-      part_type('coriolis', 'real', 'dof dof', '', &
-                'skew: force of velocities for each rad/s of model%rotation_speed')]
-
-   type(part_type), parameter :: of_pairs(*) = [ &
-      part_type('contact/side_1', 'integer', 'pair 3', with_pairs, &
-                'dof numbers of t1, t2, n, from 1: negative with the sign turned, 0 for none'), &
-      part_type('contact/side_2', 'integer', 'pair 3', with_pairs, &
-                'of the other side, 0: ground'), &
-      part_type('contact/sector_2', 'integer', 'pair', '', &
-                'sector of side 2, counted from that of side 1'), &
-      part_type('contact/mu', 'real', 'one_or pair', '', 'friction coefficient'), &
-      part_type('contact/gap', 'real', 'one_or pair', '', 'initial gap; negative: interference'), &
-      part_type('contact/area', 'real', 'one_or pair', '', 'of a pair'), &
-      part_type('contact/normal_load', 'real', 'one_or pair', '', &
-                'constant compressive force of pairs without a normal dof')]
-
-   type(part_type), parameter :: beside_pairs(*) = [ &
-      part_type('contact@law', 'text', '', '', 'the law where the case names none'), &
-      part_type('contact/position', 'real', 'pair 3', '', 'coordinates, for pictures'), &
-      part_type('contact/patch', 'text', 'pair', '', 'name of the surface of each pair')]
-
-   type(part_type), parameter :: of_springs(*) = [ &
-      part_type('spring/side_1', 'integer', 'spring', with_springs, 'dof number from 1, signed'), &
-      part_type('spring/side_2', 'integer', 'one_or spring', '', '0, the ground, without it'), &
-      part_type('spring/sector_2', 'integer', 'one_or spring', '', &
-                'sector of side 2, counted from that of side 1; 0 without it'), &
-      part_type('spring/coefficient', 'real', 'one_or spring', with_springs, &
-                'force = coefficient * elongation**power'), &
-      part_type('spring/power', 'integer', 'one_or spring', '', '3 without it')]
-
-   type(part_type), parameter :: of_loads(*) = [ &
-      part_type('load/static', 'real', 'dof', '', 'constant load'), &
-      part_type('load/cosine', 'real', 'dof', '', 'in phase with cos(omega t)'), &
-      part_type('load/sine', 'real', 'dof', '', 'in phase with sin(omega t)'), &
-      part_type('load/static_rotation', 'real', 'dof', '', &
-                'constant load for each (rad/s)^2 of model%rotation_speed'), &
-      part_type('load/harmonic', 'integer', 'load', '', 'harmonics 0, 1, .. of further loads'), &
-      part_type('load/harmonic_cosine', 'real', 'load dof', '', 'their cosine parts'), &
-      part_type('load/harmonic_sine', 'real', 'load dof', '', 'their sine parts'), &
-      part_type('observe/name', 'text', 'quantity', 'with /observe', &
-                'names, with one of the two that follow'), &
-      part_type('observe/dof', 'integer', 'quantity', '', 'signed dof numbers'), &
-      part_type('observe/matrix', 'real', 'quantity dof', '', 'a linear combination of dofs each')]
-
-   type(part_type), parameter :: of_sectors(*) = [ &
-      part_type('cyclic@n_sectors', 'integer', '', 'with /cyclic', 'makes the model a sector'), &
-      part_type('cyclic@n_physical', 'integer', '', 'with /nodal_diameter', &
-                'displacements in front of the coordinates of every nodal diameter, which take '// &
-                'the place of matrices and interfaces of a sector'), &
-      part_type('cyclic@phase', 'text', '', '', '"delay" (without it): matrices of nodal '// &
-                'diameters are of u_right = exp(-2 pi i K/N) u_left; "advance": of the other '// &
-                'sign'), &
-      part_type('cyclic/left', 'integer', 'interface', '', 'dofs from 1 of one interface'), &
-      part_type('cyclic/right', 'integer', 'interface', '', &
-                'of the other, which moves as the left one of the next sector; negative: with '// &
-                'the sign turned')]
-
-   type(part_type), parameter :: of_diameters(*) = [ &
-      part_type('nodal_diameter/K/mass', 'complex', 'order order', 'with its group', &
-                'Hermitian; K = 0, 1, .. N/2 as far as harmonics need them, rigid laws take '// &
-                'the mean of all that are there'), &
-      part_type('nodal_diameter/K/stiffness', 'complex', 'order order', 'with its group', &
-                'Hermitian'), &
-      part_type('nodal_diameter/K/damping', 'complex', 'order order', '', 'Hermitian'), &
-      part_type('nodal_diameter/K/stiffness_rotation', 'complex', 'order order', '', &
-                'Hermitian'), &
-      part_type('nodal_diameter/K/coriolis', 'complex', 'order order', '', &
-                'skew-Hermitian, for each rad/s'), &
-      part_type('nodal_diameter/K/load/static', 'complex', 'order', '', &
-                'reduced load of sector 0; without it that of /load, on the displacements'), &
-      part_type('nodal_diameter/K/load/cosine', 'complex', 'order', '', 'likewise'), &
-      part_type('nodal_diameter/K/load/sine', 'complex', 'order', '', 'likewise'), &
-      part_type('nodal_diameter/K/load/static_rotation', 'complex', 'order', '', 'likewise'), &
-      part_type('nodal_diameter/K/observe/matrix', 'complex', 'quantity order', '', &
-                'rows of the quantities of /observe/name'), &
-      part_type('aero/sector/M', 'complex', 'motion motion', '', &
-                'forces of the air by the motion of sector M, counted from the one that feels '// &
-                'them'), &
-      part_type('aero/nodal_diameter/M', 'complex', 'motion motion', '', &
-                'in place of these: by signed nodal diameters'), &
-      part_type('aero/modes', 'real', 'motion dof', '', &
-                'rows of motion that they are of; without them every dof')]
-
-   type(part_type), parameter :: of_mesh(*) = [ &
-      part_type('mesh/points', 'real', 'point 3', with_mesh, 'positions, for fretwear export'), &
-      part_type('mesh/cells', 'integer', 'cell 8', with_mesh, 'corners of the cells: points '// &
-                'from 0 in the order of VTK, -1 behind the last one'), &
-      part_type('mesh/body', 'integer', 'cell', with_mesh, 'body of each cell'), &
-      part_type('mesh/kind', 'integer', 'cell', '', 'type of each cell by its number in VTK: '// &
-                '5, 9, 10, 12, 13, 14; hexahedra (12) without it'), &
-      part_type('mesh/facets', 'integer', 'facet 4', with_mesh, &
-                'facets in contact, points in cyclic order'), &
-      part_type('mesh/pair', 'integer', 'facet', with_mesh, 'pair of each facet, from 0'), &
-      part_type('mesh/basis', 'real', '3_point dof', with_mesh, &
-                'displacement x, y, z of point 0, then 1, .. per unit of each dof')]
+   !> Writes down what there is.
+   type, extends(part_source) :: part_list
+      type(part_type), allocatable :: parts(:)
+   contains
+      procedure :: seek => add_part
+      procedure :: numbers => any_number
+      procedure :: note => add_note
+   end type part_list
 
 contains
 
    !> All parts, in the order of the documents.
    function model_parts() result(parts)
       type(part_type), allocatable :: parts(:)
+      type(part_list) :: list
+      type(raw_model) :: nothing
 
-      parts = [of_structure, of_pairs, of_laws(), beside_pairs, of_springs, of_loads, of_sectors, &
-               of_diameters, of_mesh]
+      allocate (list%parts(0))
+      list%constants = keys_of_laws()
+      call nothing%bind_parts(list)
+      call move_alloc(list%parts, parts)
    end function model_parts
+
+   subroutine add_part(self, part, found)
+      class(part_list), intent(inout) :: self
+      type(part_type), intent(in) :: part
+      logical, intent(out) :: found
+
+      self%parts = [self%parts, part]
+      found = .false.
+   end subroutine add_part
+
+   subroutine add_note(self, kind, part)
+      class(part_list), intent(inout) :: self
+      character(*), intent(in) :: kind
+      type(part_type), intent(in) :: part
+
+      self%parts = [self%parts, part]
+      self%parts(size(self%parts))%kind = kind
+   end subroutine add_note
+
+   !> One stands for all.
+   subroutine any_number(self, part, least, most, list)
+      class(part_list), intent(inout) :: self
+      type(part_type), intent(in) :: part
+      integer, intent(in) :: least, most
+      integer, allocatable, intent(out) :: list(:)
+
+      associate (unused => self, of => part, neither => most)
+      end associate
+      list = [max(0, least)]
+   end subroutine any_number
 
    !> The name by which a calling program gives a part; empty of those that only files have.
    pure function put_name(name) result(text)
@@ -164,30 +84,6 @@ contains
       if (at == 1) text = trim(name(2:))
       if (at > 1) text(at:at) = '/'
    end function put_name
-
-   !> The part that a calling program names; a blank one where there is none of that name.
-   function part_to_put(name) result(part)
-      character(*), intent(in) :: name
-      type(part_type) :: part
-      character(*), parameter :: numbered(*) = [character(20) :: 'nodal_diameter/', &
-         'aero/sector/', 'aero/nodal_diameter/']
-      type(part_type), allocatable :: parts(:)
-      character(:), allocatable :: pattern
-      integer :: i, n
-
-      pattern = name
-      do i = 1, size(numbered)
-         n = len_trim(numbered(i))
-         if (index(name, numbered(i)(:n)) /= 1) cycle
-         pattern = name(:n)//merge('K', 'M', i == 1)// &
-                   name(n + index(name(n + 1:)//'/', '/'):)
-      end do
-      part = part_type('', '', '', '', '')
-      parts = model_parts()
-      do i = 1, size(parts)
-         if (put_name(parts(i)%name) == pattern .and. len(pattern) > 0) part = parts(i)
-      end do
-   end function part_to_put
 
    !> Whether a part is given as numbers of a kind: complex ones as pairs of reals.
    pure logical function is_of_kind(part, kind)
@@ -224,29 +120,6 @@ contains
       call ask_laws(nobody, contact)
       call move_alloc(contact%constants%named, keys)
    end function keys_of_laws
-
-   !> Their names.
-   function law_constant_names() result(names)
-      character(24), allocatable :: names(:)
-      type(key_type), allocatable :: keys(:)
-
-      keys = keys_of_laws()
-      names = keys%name
-   end function law_constant_names
-
-   !> Constants of pairs that laws declare.
-   function of_laws() result(parts)
-      type(part_type), allocatable :: parts(:)
-      type(key_type), allocatable :: keys(:)
-      integer :: k
-
-      keys = keys_of_laws()
-      allocate (parts(size(keys)))
-      do k = 1, size(keys)
-         parts(k) = part_type('contact/'//keys(k)%name, 'real', 'one_or pair', '', &
-                              trim(keys(k)%help)//'; '//trim(keys(k)%only))
-      end do
-   end function of_laws
 
    !> The table as Markdown.
    subroutine write_parts(unit)

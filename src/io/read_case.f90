@@ -4,10 +4,11 @@ module fw_read_case
    use fw_case, only: analyses, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
-   use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
+   use fw_harmonics_options, only: method_hbm, most_for_accuracy, sampling_uniform, usual_accuracy
    use fw_kinds, only: wp
+   use fw_laws, only: law_words, usual_law
    use fw_load_terms, only: load_terms
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_model_forming, only: form_structure
    use fw_model_keys, only: model_options
    use fw_parameter_sweep, only: as_factor
@@ -15,11 +16,10 @@ module fw_read_case
    use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
-   use fw_read_control, only: read_control
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_mode, read_sweep
-   use fw_read_output, only: read_output, read_observed
+   use fw_read_output, only: read_control, read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
    use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
    use fw_read_worn, only: read_worn
@@ -31,7 +31,6 @@ module fw_read_case
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_unit_values, only: convert_units, has_units, needs_system
-   use fw_usual_law, only: choose_law
    use fw_values, only: number_text, quoted_text
    implicit none (type, external)
    private
@@ -96,7 +95,7 @@ contains
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
       !> The model where the calling program gives it, with mass and stiffness.
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
 
       !$omp critical (fretwear_io)
       call read_groups(input, case, error, memory_model)
@@ -109,7 +108,7 @@ contains
       type(case_input), intent(in) :: input
       type(case_type), intent(inout) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       type(reader_type) :: reader
       character(:), allocatable :: text
 
@@ -142,7 +141,7 @@ contains
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       type(record_list) :: keys
       character(:), allocatable :: system
 
@@ -155,6 +154,51 @@ contains
       call convert_units(reader, keys, system)
       call reader%raise(error)
    end subroutine read_units
+
+   !> Where a law was not given, take the one that is right, in the effective input too: rigid
+   !> friction of high order, which is right on masses and on nodes without mass, where the rest of
+   !> the case goes with it; else rigid friction at the instants.
+   subroutine choose_law(reader, case)
+      type(reader_type), intent(inout) :: reader
+      type(case_type), intent(inout) :: case
+
+      if (reader%given('contact', 'law') .or. case%contact%n_pairs == 0) return
+      ! What was saved with the pairs is as good as given.
+      if (case%contact%law_is_of_model) return
+      associate (contact => case%contact)
+         contact%law = usual_law(goes_with_events(case))
+         ! Integrated in time, the rigid laws are one, and nothing was chosen.
+         contact%law_is_chosen = .not. analyses(case%analysis)%is_integrated
+         call reader%amend('contact', 'law', quoted_text(trim(law_words(contact%law))))
+      end associate
+   end subroutine choose_law
+
+   !> Whether nothing asks for instants: where forces are followed from event to event by
+   !> themselves. Integration in time knows one rigid law only, slip in two directions has no law of
+   !> high order, and neither has a structure that feeds its vibration.
+   pure logical function goes_with_events(case) result(goes)
+      type(case_type), intent(in) :: case
+
+      associate (h => case%harmonics, c => case%contact)
+         goes = analyses(case%analysis)%is_balanced .and. &
+                h%method == method_hbm .and. h%sampling /= sampling_uniform .and. &
+                h%n_time == 0 .and. .not. h%adaptive .and. .not. case%output%histories .and. &
+                .not. any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)) .and. &
+                .not. feeds_energy(case)
+      end associate
+   end function goes_with_events
+
+   !> Whether a dof is damped negatively: an oscillator that takes energy has no path to follow.
+   pure logical function feeds_energy(case) result(feeds)
+      type(case_type), intent(in) :: case
+      integer :: i
+
+      feeds = .false.
+      if (.not. allocated(case%model%damping)) return
+      do i = 1, size(case%model%damping, 1)
+         feeds = feeds .or. case%model%damping(i, i) < 0.0_wp
+      end do
+   end function feeds_energy
 
    !> Where nothing is said of the harmonics, an accuracy chooses them, if the rest of the case goes
    !> with one: a single harmonic says little of friction and gaps.
@@ -209,8 +253,8 @@ contains
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
-      type(file_model_type) :: raw
+      type(raw_model), intent(in), optional :: memory_model
+      type(raw_model) :: raw
 
       ! Sizes (n_dof, n_pairs, n_springs) are told before the arrays whose shapes name them.
       call case%bind_keys(reader)
@@ -286,7 +330,7 @@ contains
    !> The files that the case was read from, after those that are listed already.
    subroutine list_inputs(path, raw, inputs)
       character(*), intent(in) :: path
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(string_type), allocatable, intent(inout) :: inputs(:)
       integer :: i
 
@@ -304,9 +348,9 @@ contains
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
       !> The parts of the model as they were given.
-      type(file_model_type), intent(out) :: raw
+      type(raw_model), intent(out) :: raw
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       type(model_options) :: options
       type(load_terms) :: terms
       character(:), allocatable :: worn
@@ -317,7 +361,7 @@ contains
       if (allocated(error)) return
       call read_cyclic(reader, raw%cyclic, n_dof, analyses(case%analysis)%has_points, &
                        case%model%cyclic)
-      call read_contact(reader, raw, analyses(case%analysis)%wears, &
+      call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
       call read_worn(reader, directory_of(path), case%contact, worn, error)
       if (allocated(error)) return

@@ -10,7 +10,6 @@ module fw_read_contact
    use fw_kinds, only: wp
    use fw_law_text, only: law_text
    use fw_laws, only: law_words, laws_of, is_rigid
-   use fw_model_file, only: file_model_type
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_text_list, only: name_sectors
@@ -25,10 +24,10 @@ module fw_read_contact
 contains
 
    !> Group &contact. Every array but area, position and patch leaves allocated.
-   subroutine read_contact(reader, file_model, needs_area, n_sectors, contact)
+   subroutine read_contact(reader, file_pairs, needs_area, n_sectors, contact)
       type(reader_type), intent(inout) :: reader
-      !> What the model file holds; overridden here.
-      type(file_model_type), intent(in) :: file_model
+      !> What the model holds; overridden here.
+      type(contact_type), intent(in) :: file_pairs
       !> Whether the analysis is one of wear.
       logical, intent(in) :: needs_area
       !> Sectors whose pairs may differ.
@@ -37,7 +36,7 @@ contains
       real(wp) :: scale
 
       ! The order matters: see fw_contact_keys.
-      call read_n_pairs(reader, file_model, n_sectors, contact)
+      call read_n_pairs(reader, file_pairs, n_sectors, contact)
       call bind_law(reader, contact)
       call read_sides(reader, contact)
       if (n_sectors > 1) call repeat_pairs(reader, n_sectors, contact)
@@ -47,38 +46,33 @@ contains
       scale = contact%penalty_scale
       if (.not. is_rigid(contact) .and. abs(scale - 1.0_wp) > 0.0_wp) then
          call reader%refuse('contact', 'penalty_scale', 'has no meaning with law = '// &
-                            law_text(contact)//': '// &
+                            trim(law_text(contact))//': '// &
                             'scale the stiffnesses themselves')
       end if
    end subroutine read_contact
 
    !> The number of pairs, and what the file says of them where it is about the same pairs.
-   subroutine read_n_pairs(reader, file_model, n_sectors, contact)
+   subroutine read_n_pairs(reader, file_pairs, n_sectors, contact)
       type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(in) :: file_model
+      type(contact_type), intent(in) :: file_pairs
       integer, intent(in) :: n_sectors
       type(contact_type), intent(inout) :: contact
       integer :: n_file
 
       n_file = 0
-      if (allocated(file_model%side_1)) n_file = size(file_model%side_1, 2)
+      if (allocated(file_pairs%side_1)) n_file = size(file_pairs%side_1, 2)
       ! The default of the key is what the file holds.
       contact%n_pairs = n_file
       call bind_pairs(reader, contact)
       if (contact%n_pairs == n_file .and. n_file > 0) then
-         contact%side_1 = file_model%side_1
-         contact%side_2 = file_model%side_2
-         if (allocated(file_model%cyclic%sector_2)) contact%sector_2 = file_model%cyclic%sector_2
-         call repeat_values(file_model%mu, n_file, n_sectors, contact%mu)
-         call repeat_values(file_model%gap, n_file, n_sectors, contact%gap)
-         call repeat_values(file_model%area, n_file, n_sectors, contact%area)
-         call repeat_values(file_model%normal_load, n_file, n_sectors, contact%normal_load)
-         call contact%constants%offer_all(file_model%constants, n_file, n_sectors)
-         ! Only with the pairs that it was written for: other pairs take the usual law.
-         contact%law_is_of_model = file_model%law > 0
-         if (contact%law_is_of_model) contact%law = file_model%law
-         if (allocated(file_model%position)) contact%position = file_model%position
-         if (allocated(file_model%patch)) contact%patch = file_model%patch
+         ! The law too only with the pairs that it was written for: others take the usual law.
+         contact = file_pairs
+         contact%n_pairs = n_file
+         call repeat_values(n_file, n_sectors, contact%mu)
+         call repeat_values(n_file, n_sectors, contact%gap)
+         call repeat_values(n_file, n_sectors, contact%area)
+         call repeat_values(n_file, n_sectors, contact%normal_load)
+         call contact%constants%offer_all(file_pairs%constants, n_file, n_sectors)
       else if (n_file > 0 .and. contact%n_pairs > 0 &
                .and. .not. reader%given('contact', 'side_1')) then
          call reader%refuse('contact', 'n_pairs', '= '//to_text(contact%n_pairs)// &
@@ -91,16 +85,13 @@ contains
    end subroutine read_n_pairs
 
    !> Values of the pairs of a file, of one sector for all or of every sector.
-   pure subroutine repeat_values(given, n_pairs, n_sectors, values)
-      real(wp), allocatable, intent(in) :: given(:)
+   pure subroutine repeat_values(n_pairs, n_sectors, values)
       integer, intent(in) :: n_pairs, n_sectors
       real(wp), allocatable, intent(inout) :: values(:)
       integer :: j
 
-      if (allocated(values)) deallocate (values)
-      if (.not. allocated(given)) return
-      values = given
-      if (size(given) == n_pairs) values = [(given, j=1, n_sectors)]
+      if (.not. allocated(values)) return
+      if (size(values) == n_pairs) values = [(values, j=1, n_sectors)]
    end subroutine repeat_values
 
    !> From the pairs of a sector to those of all, sector after sector.
@@ -232,7 +223,8 @@ contains
       call contact%constants%first_of_others(laws_of(contact), name, other)
       if (other > 0) then
          call reader%refuse('contact', trim(name), "belongs to law = '"//trim(law_words(other))// &
-                            "', but law = "//law_text(contact)//': remove it or change the law')
+                            "', but law = "//trim(law_text(contact))// &
+                            ': remove it or change the law')
       end if
       ! Components of their own beside the constants: results and restarts hold them.
       contact%tangential_stiffness = contact%constants%get('tangential_stiffness', contact%n_pairs)

@@ -11,7 +11,8 @@ module fw_read_model
    use fw_matrix_checks, only: check_matrix, check_skew, check_vector
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
-   use fw_model_file, only: file_model_type, read_model_hdf5
+   use fw_model_file, only: read_model_hdf5
+   use fw_raw_model, only: raw_model
    use fw_model_forming, only: finish_structure, form_matrices, model_origin
    use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads, source_words, &
       source_inline, source_hdf5, source_matrix_market, source_memory
@@ -42,11 +43,11 @@ contains
       character(*), intent(in) :: directory
       type(model_options), intent(inout) :: options
       !> What the model consists of, whatever its source.
-      type(file_model_type), intent(out) :: raw
+      type(raw_model), intent(out) :: raw
       integer, intent(out) :: n_dof
       type(error_type), allocatable, intent(out) :: error
       !> What the calling program hands over, with mass and stiffness.
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       logical :: is_inline, is_file
 
       call choose_source(reader, present(memory_model), options)
@@ -78,7 +79,7 @@ contains
    subroutine take_unit_system(reader, options, raw)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(inout) :: raw
+      type(raw_model), intent(inout) :: raw
 
       if (.not. allocated(options%unit_system)) return
       if (allocated(raw%unit_system)) then
@@ -97,7 +98,7 @@ contains
       type(reader_type), intent(in) :: reader
       character(*), intent(in) :: directory
       character(:), allocatable, intent(out) :: system
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       type(hdf5_file) :: file
       type(error_type), allocatable :: error
       character(:), allocatable :: path
@@ -149,7 +150,7 @@ contains
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: directory
       type(model_options), intent(inout) :: options
-      type(file_model_type), intent(out) :: raw
+      type(raw_model), intent(out) :: raw
       type(error_type), allocatable, intent(out) :: error
 
       call reader%amend('model', 'file', quoted_text(resolve_path(options%file, directory)))
@@ -170,7 +171,7 @@ contains
    subroutine read_in_trial(self, path)
       class(model_trial), intent(in) :: self
       character(*), intent(in) :: path
-      type(file_model_type) :: model
+      type(raw_model) :: model
       type(error_type), allocatable :: ignored
 
       associate (unused => self)
@@ -184,7 +185,7 @@ contains
       logical, intent(in) :: is_inline
       !> Dofs of the model file on entry.
       integer, intent(inout) :: n_dof
-      type(file_model_type), intent(inout) :: raw
+      type(raw_model), intent(inout) :: raw
       !> Not beside a file whose source is missing: that is said, and is enough.
       logical, intent(in) :: needed
       real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
@@ -222,7 +223,7 @@ contains
    subroutine read_loads(reader, options, raw, terms)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(inout) :: options
-      type(file_model_type), intent(inout) :: raw
+      type(raw_model), intent(inout) :: raw
       !> Loads in any harmonic.
       type(load_terms), intent(inout) :: terms
 
@@ -235,7 +236,7 @@ contains
    subroutine finish_model(reader, options, raw, terms, model, origin, error, wanted)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(inout) :: raw
+      type(raw_model), intent(inout) :: raw
       type(load_terms), intent(in) :: terms
       type(model_type), intent(inout) :: model
       !> Filled where it is allocated, for a structure that is to be formed again.
@@ -281,7 +282,7 @@ contains
    subroutine check_rotation(reader, speed, raw)
       type(reader_type), intent(inout) :: reader
       real(wp), intent(in) :: speed
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
 
       if (speed <= 0.0_wp) return
       if (allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation) .or. &
@@ -295,7 +296,7 @@ contains
    subroutine take_whirl(reader, options, raw, model)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(inout) :: raw
+      type(raw_model), intent(inout) :: raw
       type(model_type), intent(inout) :: model
       character(:), allocatable :: message
 
@@ -319,7 +320,7 @@ contains
    !> Finite, symmetric, of the same size.
    subroutine check_parts(reader, raw, is_inline)
       type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(inout) :: raw
+      type(raw_model), intent(inout) :: raw
       logical, intent(in) :: is_inline
       character(:), allocatable :: message
       integer :: n_dof

@@ -6,7 +6,7 @@ module fw_read_nodal
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: model_type
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_model_keys, only: model_options
    use fw_reader, only: reader_type
    use fw_sector, only: damp_modes
@@ -26,7 +26,7 @@ contains
    subroutine finish_nodal(reader, options, raw, static, model, error)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(inout) :: raw
+      type(raw_model), intent(inout) :: raw
       !> Static loads beside those of the file (n_physical).
       real(wp), intent(in) :: static(:)
       type(model_type), intent(inout) :: model
@@ -114,7 +114,7 @@ contains
    subroutine put_together(reader, options, raw, parts, nodal, error)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(nodal_parts), intent(in) :: parts
       type(nodal_matrices), intent(inout) :: nodal
       type(error_type), allocatable, intent(out) :: error
@@ -158,7 +158,7 @@ contains
    subroutine take_loads(reader, options, raw, parts, nodal)
       type(reader_type), intent(in) :: reader
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(nodal_parts), intent(in) :: parts
       type(nodal_matrices), intent(inout) :: nodal
 
@@ -198,7 +198,7 @@ contains
    !> displacements.
    pure subroutine stand_in(options, raw, model)
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(model_type), intent(inout) :: model
       integer :: k, n
 
@@ -222,7 +222,7 @@ contains
    !> Observed quantities of every nodal diameter: rows of displacements, and rows of the nodal
    !> diameters themselves by their places.
    pure subroutine observe_nodal(raw, picks, model)
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       !> Factors of the rows that stand with the nodal diameters (n_observed, n_rows).
       real(wp), intent(in) :: picks(:, :)
       type(model_type), intent(inout) :: model

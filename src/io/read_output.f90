@@ -1,10 +1,12 @@
-!> Group &output: the result file and what is observed.
+!> Groups &output and &control: the result file, what is observed, and amplitudes of that which are
+!> given in place of the load.
 module fw_read_output
    use fw_case, only: output_options
+   use fw_control_options, only: control_options, of_first_harmonic
    use fw_key, only: key, key_visitor
    use fw_kinds, only: wp
    use fw_model, only: model_type
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_read_nodal, only: observe_nodal
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
@@ -15,7 +17,7 @@ module fw_read_output
    implicit none (type, external)
    private
 
-   public :: read_output, read_observed
+   public :: read_control, read_output, read_observed
 
 contains
 
@@ -40,7 +42,7 @@ contains
    !> Key `observe`: dof numbers or names of the model file; all by default.
    subroutine read_observed(reader, raw, model)
       type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       !> Its number of dofs is known.
       type(model_type), intent(inout) :: model
       type(string_type), allocatable :: chosen(:), names(:)
@@ -89,7 +91,7 @@ contains
 
    !> What the model file observes, or every dof.
    subroutine list_default(raw, n_dof, names, rows)
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       integer, intent(in) :: n_dof
       type(string_type), allocatable, intent(out) :: names(:)
       real(wp), allocatable, intent(out) :: rows(:, :)
@@ -166,5 +168,41 @@ contains
          end if
       end do
    end subroutine refuse_repeated
+
+   !> Group &control.
+   subroutine read_control(reader, model, options)
+      type(reader_type), intent(inout) :: reader
+      !> Its observed quantities are known, unless something failed before.
+      type(model_type), intent(in) :: model
+      type(control_options), intent(inout) :: options
+      type(string_type), allocatable :: chosen(:)
+      logical, allocatable :: is_text(:)
+      character(*), parameter :: without = &
+         'is given without amplitude: give it, or leave this out'
+      integer :: i
+
+      call options%bind_keys(reader)
+      call reader%bind_list(key('observed', 'the quantity that has it, by the name that '// &
+                                'output%observe gives it', absent='the first one', &
+                                only='amplitude'), 'an observed quantity', 1, chosen, is_text)
+      if (reader%failed()) return
+      if (.not. options%is_wanted()) then
+         ! The default of `of` stands in every case that is written out.
+         if (options%of /= of_first_harmonic) call reader%refuse('control', 'of', without)
+         if (reader%given('control', 'observed')) call reader%refuse('control', 'observed', without)
+         return
+      end if
+      if (size(chosen) == 0 .or. .not. allocated(model%observe_name)) return
+      associate (names => model%observe_name, word => chosen(1)%text)
+         do i = 1, size(names)
+            ! A dof number k is called uk.
+            if (names(i)%text /= word .and. names(i)%text /= 'u'//word) cycle
+            options%observed = i
+            return
+         end do
+         call reader%refuse('control', 'observed', '= '//quoted_text(word)//': must be an '// &
+                            'observed quantity'//did_you_mean(word, names))
+      end associate
+   end subroutine read_control
 
 end module fw_read_output

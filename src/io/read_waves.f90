@@ -5,7 +5,7 @@ module fw_read_waves
    use fw_kinds, only: wp
    use fw_load_terms, only: add_wave, load_terms
    use fw_load_waves, only: load_waves
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -62,7 +62,7 @@ contains
    !> more than once, and adds up; a power of the frequency makes a wave of its own.
    subroutine gather_waves(reader, raw, terms, cyclic, n_dof, waves, columns, static)
       type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(load_terms), intent(in) :: terms
       type(cyclic_type), intent(in) :: cyclic
       integer, intent(in) :: n_dof
@@ -115,7 +115,7 @@ contains
    !> first harmonic is of order 1, and a wave around sectors has the order of the sweep.
    subroutine check_orders(reader, raw, terms, cyclic)
       type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(load_terms), intent(in) :: terms
       type(cyclic_type), intent(in) :: cyclic
       logical :: has_first, has_others

@@ -288,7 +288,8 @@ contains
       if (allocated(self%unit_system)) to%unit_system = self%unit_system
       call write_header(case, to)
       if (case%contact%n_pairs > 0) call write_pairs(case%contact, to)
-      call write_cyclic(case, to)
+      call write_cyclic(case%model%cyclic, analyses(case%analysis)%has_points, &
+                        case%harmonics%n_harmonics, to)
       call move_alloc(to%error, error)
    end subroutine write_head
 

@@ -28,10 +28,10 @@ module fw_result_group
       !> The first failure: what comes behind it is left out.
       type(error_type), allocatable :: error
    contains
-      generic :: put => put_reals, put_matrix, put_block, put_integers, put_texts
+      generic :: put => put_reals, put_integers, put_texts
       generic :: note => note_text, note_integer, note_real
       procedure :: put_places
-      procedure, private :: put_reals, put_matrix, put_block, put_integers, put_texts
+      procedure, private :: put_reals, put_integers, put_texts
       procedure, private :: note_text, note_integer, note_real
       procedure, private :: label
    end type group_writer
@@ -54,38 +54,17 @@ module fw_result_group
 
 contains
 
-   !> A list of numbers. `name` is the path of the dataset, `dimensions` their names in the order of
-   !> h5py, separated by blanks; `unit` as in `unit_of`.
+   !> Numbers of any rank; h5py shows their shape reversed. `name` is the path of the dataset,
+   !> `dimensions` their names in the order of h5py, separated by blanks; `unit` as in `unit_of`.
    subroutine put_reals(self, name, values, unit, dimensions, long_name)
       class(group_writer), intent(inout) :: self
       character(*), intent(in) :: name, unit, dimensions, long_name
-      real(wp), intent(in), contiguous :: values(:)
+      real(wp), intent(in), contiguous :: values(..)
 
       if (allocated(self%error)) return
       call write_dataset(self%file, name, values, self%error)
       call self%label(name, unit, dimensions, long_name)
    end subroutine put_reals
-
-   !> Shapes are those of h5py reversed, here and in put_block.
-   subroutine put_matrix(self, name, values, unit, dimensions, long_name)
-      class(group_writer), intent(inout) :: self
-      character(*), intent(in) :: name, unit, dimensions, long_name
-      real(wp), intent(in), contiguous :: values(:, :)
-
-      if (allocated(self%error)) return
-      call write_dataset(self%file, name, values, self%error)
-      call self%label(name, unit, dimensions, long_name)
-   end subroutine put_matrix
-
-   subroutine put_block(self, name, values, unit, dimensions, long_name)
-      class(group_writer), intent(inout) :: self
-      character(*), intent(in) :: name, unit, dimensions, long_name
-      real(wp), intent(in), contiguous :: values(:, :, :)
-
-      if (allocated(self%error)) return
-      call write_dataset(self%file, name, values, self%error)
-      call self%label(name, unit, dimensions, long_name)
-   end subroutine put_block
 
    subroutine put_integers(self, name, values, unit, dimensions, long_name)
       class(group_writer), intent(inout) :: self

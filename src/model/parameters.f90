@@ -32,10 +32,14 @@ module fw_parameters
       integer :: of
       integer :: sign = any_sign
       integer :: pairs = 0
+      !> Whether fw_parameter_slopes knows its derivative; without it only sweeps by natural steps
+      !> go over it.
+      logical :: has_slope = .true.
    end type parameter_type
 
-   !> In the order of the constants. A new parameter is a row; its value in a case is in
-   !> fw_parameter_values, its derivative in fw_parameter_slopes.
+   !> In the order of the constants. A new parameter is a row. Of the pairs it is a constant of a
+   !> law, or has its value in fw_parameter_values as the others do; the derivative is in
+   !> fw_parameter_slopes.
    type(parameter_type), parameter :: parameters(*) = [ &
       parameter_type('load%harmonic_scale', of_loads), &
       parameter_type('load%static_scale', of_loads), &

@@ -13,12 +13,12 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (86300, 1000),
+    "lines of src": (86100, 1000),
     "files of src": (394, 10),
     "lines of the longest file": (782, 50),
     "modules used by one file, at most": (33, 2),
     "files that name forces%pairs": (43, 0),
-    "files that name case_type": (61, 0),
+    "files that name case_type": (54, 0),
     "files that name an analysis": (5, 0),
     "files with select type": (17, 0),
 }

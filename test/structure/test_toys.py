@@ -1,5 +1,5 @@
-"""What a new law, quantity, rule and analysis cost: each is added to a copy of the tree, compiled,
-run, and the old files that it touched are counted.
+"""What a new law, quantity, rule, analysis, part of a model file and parameter cost: each is
+added to a copy of the tree, compiled, run, and the old files that it touched are counted.
 
 A file of its own is free; a limit may only fall.
 """
@@ -13,7 +13,7 @@ import pytest
 from project import ROOT
 
 #: Old files that each may touch.
-LIMITS = {"law": 1, "quantity": 1, "rule": 1, "analysis": 2}
+LIMITS = {"law": 1, "quantity": 1, "rule": 1, "analysis": 2, "part": 2, "parameter": 1}
 
 
 class Toy:
@@ -68,7 +68,7 @@ def add_quantity(toy):
 
 def add_rule(toy):
     """Histories and a phase do not go together."""
-    toy.change("src/io/rules.f90",
+    toy.change("src/case/rules.f90",
                ("   type(rule_type), parameter :: of_sweeps(*) = [ &\n",
                 "   type(rule_type), parameter :: of_sweeps(*) = [ &\n"
                 "      rule_type('output%histories', 'output%tail', 'toys refuse it'), &\n"))
@@ -115,7 +115,7 @@ contains
 
 end module fw_run_toy
 """)
-    toy.change("src/io/case.f90",
+    toy.change("src/case/case.f90",
                ("'mode', 'resonance']\n   type", "'mode', 'resonance', 'toy']\n   type"),
                ("             analysis_modes, analysis_mode, analysis_resonance\n",
                 "             analysis_modes, analysis_mode, analysis_resonance, analysis_toy\n"),
@@ -134,7 +134,31 @@ end module fw_run_toy
                 "      else if (case%analysis == analysis_mode) then\n         call run_mode("))
 
 
-TOYS = {"law": add_law, "quantity": add_quantity, "rule": add_rule, "analysis": add_analysis}
+def add_part(toy):
+    """'/load/toy' of a model file: a constant load on top of the others."""
+    toy.change("src/case/raw_model.f90",
+               ("      real(wp), allocatable :: load_static_rotation(:)\n",
+                "      real(wp), allocatable :: load_static_rotation(:), load_toy(:)\n"),
+               ("      call to%bind(part('load/sine',",
+                "      call to%bind(part('load/toy', 'dof', 'on top of others'), self%load_toy)\n"
+                "      call to%bind(part('load/sine',"))
+    toy.change("src/io/read_waves.f90",
+               ("      static = 0.0_wp\n",
+                "      static = 0.0_wp\n"
+                "      if (allocated(raw%load_toy)) static = raw%load_toy\n"))
+
+
+def add_parameter(toy):
+    """'contact%slip_speed': a constant of a law that sweeps go over."""
+    toy.change("src/model/parameters.f90",
+               ("      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative)]",
+                "      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative), &\n"
+                "      parameter_type('contact%slip_speed', of_pairs, positive, of_sliding, &\n"
+                "                     .false.)]"))
+
+
+TOYS = {"law": add_law, "quantity": add_quantity, "rule": add_rule, "analysis": add_analysis,
+        "part": add_part, "parameter": add_parameter}
 
 
 @pytest.fixture(scope="module", name="built")
@@ -213,3 +237,64 @@ def test_analysis_runs(built, tmp_path):
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "analysis.h5") as file:
         assert list(file["toy/pairs"]) == [1]
+
+
+MODEL = """
+&model source = 'hdf5', file = 'm.h5' /
+&load cosine = 1.0, static_scale = 1.0 /
+&harmonics n_harmonics = 1 /
+&sweep start = 0.8, end = 1.2, n_points = 5 /
+"""
+
+
+def write_model(path, **loads):
+    with h5py.File(path, "w") as file:
+        file.attrs.update({"format": "fretwear-model", "format_version": 1})
+        file.update({"mass": [[1.0]], "stiffness": [[1.0]], "damping": [[0.1]],
+                     **{f"load/{name}": value for name, value in loads.items()}})
+
+
+def test_part_is_read(built, tmp_path):
+    results = []
+    for loads in ({"static": [3.0]}, {"toy": [3.0]}):
+        write_model(tmp_path / "m.h5", **loads)
+        done = run(built[0], tmp_path, "part", MODEL)
+        assert done.returncode == 0, done.stderr
+        with h5py.File(tmp_path / "part.h5") as file:
+            results.append(file["coefficients"][:])
+    assert np.array_equal(*results) and results[0].any()
+
+
+def test_part_is_checked(built, tmp_path):
+    write_model(tmp_path / "m.h5", toy=[3.0, 4.0])
+    assert "/load/toy has shape (2,), expected (1,)" in run(built[0], tmp_path, "a", MODEL).stderr
+    write_model(tmp_path / "m.h5", toyy=[3.0])
+    assert "did you mean /load/toy?" in run(built[0], tmp_path, "b", MODEL).stderr
+    listed = subprocess.run([built[0], "--parts"], capture_output=True, text=True, check=True)
+    assert "| `/load/toy` | real | (dof) |" in listed.stdout
+
+
+def test_parameter_is_swept(built, tmp_path):
+    text = RUBBING.format(law="regularised", more="")
+    sweep = "&sweep frequency = 0.9, parameter = 'contact%slip_speed', as = 'value', values = {} /"
+    found = []
+    for values in ("0.1, 0.2", "0.2"):
+        done = run(built[0], tmp_path, "parameter",
+                   re.sub(r"&sweep.*?/\n", sweep.format(values) + "\n", text))
+        assert done.returncode == 0, done.stderr
+        with h5py.File(tmp_path / "parameter.h5") as file:
+            found.append(file["amplitude"][-1])
+    done = run(built[0], tmp_path, "alone", text.replace("slip_speed = 0.1", "slip_speed = 0.2")
+               .replace("start = 0.8, end = 1.2, n_points = 5", "values = 0.9"))
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "alone.h5") as file:
+        found.append(file["amplitude"][-1])
+    # Solved to 1e-8 or better, from other guesses.
+    assert np.allclose(found, found[-1], rtol=1e-7)
+
+
+def test_parameter_has_no_slope(built, tmp_path):
+    more = "&sensitivity parameters = 'contact%slip_speed' /"
+    done = run(built[0], tmp_path, "slope", RUBBING.format(law="regularised", more=more))
+    assert done.returncode == 3
+    assert "contact%slip_speed': its derivative is not known" in done.stderr

@@ -10,7 +10,7 @@ module fw_features
    use fw_force_law, only: law_facts
    use fw_harmonics_options, only: method_hbm, method_hdhb, sampling_events, sampling_uniform
    use fw_kinds, only: wp
-   use fw_law_text, only: law_text
+   use fw_law_text, only: law_text, law_text_length
    use fw_laws, only: facts_of, is_viscous
    use fw_parameters, only: harmonic_scale, static_scale
    use fw_resonance_options, only: condition_phase
@@ -48,14 +48,14 @@ contains
    end function knows_feature
 
    !> A phrase as a message shows it: facts of a law with the word of the law.
-   function feature_text(case, phrase) result(text)
+   pure function feature_text(case, phrase) result(text)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase
-      character(:), allocatable :: text
+      character(feature_length + law_text_length + 20) :: text
 
-      text = trim(phrase)
-      if (index(phrase, law_mark) == 1) text = 'contact%law = '//law_text(case%contact)//' ('// &
-         trim(phrase)//')'
+      text = phrase
+      if (index(phrase, law_mark) == 1) text = 'contact%law = '//trim(law_text(case%contact))// &
+         ' ('//trim(phrase)//')'
    end function feature_text
 
    subroutine look_up(case, phrase, asked, known)

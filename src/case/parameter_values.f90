@@ -1,14 +1,14 @@
 !> Values of the parameters of fw_parameters in a case that has been read, and a case with other
 !> values, as if it had been read with them.
 module fw_parameter_values
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_forming, only: form_structure
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-      is_per_pair, is_per_spring, modal_damping, normal_load, normal_stiffness, rayleigh_mass, &
-      rayleigh_stiffness, rotation_speed, static_scale, tangential_stiffness
+      is_per_pair, is_per_spring, modal_damping, normal_load, normal_stiffness, parameter_key, &
+      rayleigh_mass, rayleigh_stiffness, rotation_speed, static_scale, tangential_stiffness
    implicit none (type, external)
    private
 
@@ -18,7 +18,7 @@ contains
 
    !> Values that a parameter has: one, or one for each pair or spring.
    pure integer function n_values(case, number)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       !> As in parameter_words.
       integer, intent(in) :: number
 
@@ -29,9 +29,10 @@ contains
 
    !> Values in the case (n_values).
    pure subroutine get_parameter(case, number, values)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: number
       real(wp), allocatable, intent(out) :: values(:)
+      character(24) :: key
       integer :: k
 
       associate (c => case%contact)
@@ -46,6 +47,10 @@ contains
          case default
             if (is_per_spring(number)) then
                values = case%springs%coefficient
+               return
+            else if (is_per_pair(number)) then
+               call parameter_key(number, key)
+               values = c%constants%get(trim(key), c%n_pairs)
                return
             end if
             values = [0.0_wp]
@@ -62,12 +67,13 @@ contains
    !> Give the case other values. A parameter of the matrices needs `origin`, which the case keeps
    !> where it was read with the parameter among those wanted.
    subroutine put_parameter(case, number, values, error)
-      type(case_type), intent(inout) :: case
+      class(body_type), intent(inout) :: case
       integer, intent(in) :: number
       !> (n_values)
       real(wp), intent(in) :: values(:)
       !> Modes of the damping that cannot be found.
       type(error_type), allocatable, intent(out) :: error
+      character(24) :: key
 
       associate (c => case%contact, m => case%model)
          select case (number)
@@ -85,6 +91,8 @@ contains
             m%static_scale = values(1)
             if (allocated(case%origin)) case%origin%options%static_scale = values(1)
          case default
+            call parameter_key(number, key)
+            if (is_per_pair(number)) call c%constants%set(trim(key), values)
             if (is_per_spring(number)) case%springs%coefficient = values
             if (is_of_matrices(number)) call put_of_matrices(case, number, values(1), error)
          end select
@@ -127,7 +135,7 @@ contains
 
    !> Put the structure together anew.
    subroutine put_of_matrices(case, number, value, error)
-      type(case_type), intent(inout) :: case
+      class(body_type), intent(inout) :: case
       integer, intent(in) :: number
       real(wp), intent(in) :: value
       type(error_type), allocatable, intent(out) :: error

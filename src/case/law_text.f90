@@ -5,22 +5,24 @@ module fw_law_text
    implicit none (type, external)
    private
 
-   public :: law_text
+   public :: law_text, law_text_length
+
+   !> Of all words, each in quotes, with a comma between.
+   integer, parameter :: law_text_length = size(law_words)*(len(law_words) + 4)
 
 contains
 
    !> In quotes, each law once: 'penalty', or 'penalty', 'dlft'.
-   function law_text(contact) result(text)
+   pure function law_text(contact) result(text)
       type(contact_type), intent(in) :: contact
-      character(:), allocatable :: text
+      character(law_text_length) :: text
       integer, allocatable :: numbers(:)
       integer :: k
 
       numbers = laws_of(contact)
-      text = ''
-      do k = 1, size(numbers)
-         if (k > 1) text = text//', '
-         text = text//"'"//trim(law_words(numbers(k)))//"'"
+      text = "'"//trim(law_words(numbers(1)))//"'"
+      do k = 2, size(numbers)
+         text = trim(text)//", '"//trim(law_words(numbers(k)))//"'"
       end do
    end function law_text
 

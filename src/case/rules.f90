@@ -204,8 +204,9 @@ contains
          rule = rules(i)
          if (.not. asks_for(case, rule%asks)) cycle
          if (.not. asks_for(case, rule%forbids)) cycle
-         call fatal_error(error, feature_text(case, rule%asks)//between// &
-                          feature_text(case, rule%forbids)//': '//trim(rule%remedy), status_input)
+         call fatal_error(error, trim(feature_text(case, rule%asks))//between// &
+                          trim(feature_text(case, rule%forbids))//': '//trim(rule%remedy), &
+                          status_input)
          return
       end do
    end subroutine apply_rules

@@ -1,14 +1,12 @@
 !> A case: everything that one run needs, validated. Composed of the option types of the layers
 !> that use them; see each for its defaults.
 module fw_case
+   use fw_body, only: body_type
    use fw_key, only: key, key_visitor
    use fw_key_range, only: at_least, from_to
    use fw_kinds, only: wp
    use fw_mode_options, only: mode_options
    use fw_parameter_sweep, only: parameter_sweep
-   use fw_model_forming, only: model_origin
-   use fw_model, only: model_type
-   use fw_contact_data, only: contact_type, spring_type
    use fw_control_options, only: control_options
    use fw_harmonics_options, only: harmonics_options
    use fw_resonance_options, only: resonance_options
@@ -71,16 +69,13 @@ module fw_case
       procedure :: bind_keys => bind_output_keys
    end type output_options
 
-   type :: case_type
+   type, extends(body_type) :: case_type
       character(:), allocatable :: title
       integer :: analysis = analysis_frf
       !> OpenMP threads (0: all).
       integer :: threads = 0
       !> Time after which the run ends with what is done [s] (0: none).
       real(wp) :: max_seconds = 0.0_wp
-      type(model_type) :: model
-      type(contact_type) :: contact
-      type(spring_type) :: springs
       type(harmonics_options) :: harmonics
       type(sweep_options) :: sweep
       !> What the sweep goes over where that is not the frequency.
@@ -106,12 +101,6 @@ module fw_case
       type(sensitivity_options) :: sensitivity
       type(mode_options) :: mode
       type(resonance_options) :: resonance
-      !> The parameter of fw_parameters that changes from point to point (0: none), and what the
-      !> model is formed from, only where that changes its matrices.
-      integer :: varied = 0
-      !> Lowest and highest value of a parameter of the matrices that changes so.
-      real(wp) :: varied_span(2) = 0.0_wp
-      type(model_origin), allocatable :: origin
    contains
       procedure :: bind_keys => bind_case_keys
    end type case_type

@@ -1,0 +1,218 @@
+!> What a model consists of before anything is put together, whatever its source, and the table of
+!> its parts: a row each, bound to the component that holds it.
+module fw_raw_model
+   use fw_contact_data, only: contact_type, spring_type
+   use fw_cyclic_parts, only: cyclic_parts
+   use fw_kinds, only: wp
+   use fw_part, only: by_columns, either_way, part, part_source, part_type
+   use fw_text, only: string_type, to_text
+   implicit none (type, external)
+   private
+
+   public :: raw_model
+
+   !> A component is not allocated where the model has none.
+   type :: raw_model
+      character(:), allocatable :: title, unit_system
+      !> Paths of the files it was read from.
+      type(string_type), allocatable :: files(:)
+      !> What stands in the file and nothing reads.
+      type(string_type), allocatable :: unread(:)
+      !> Structure (n_dof, n_dof), not checked for symmetry.
+      real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
+      !> Stiffness per square of the rotation speed (n_dof, n_dof) [force/length/(rad/s)**2].
+      real(wp), allocatable :: stiffness_rotation(:, :)
+      !> Contact pairs, with what the model says of them: dofs are not checked for their range,
+      !> `constants` offers those of laws.
+      type(contact_type) :: contact
+      !> Nonlinear springs, with what the model says of them.
+      type(spring_type) :: springs
+      !> Loads (n_dof) [force]; the last per square of the rotation speed.
+      real(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
+      real(wp), allocatable :: load_static_rotation(:)
+      !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
+      type(string_type), allocatable :: observe_name(:)
+      real(wp), allocatable :: observe_matrix(:, :)
+      !> What makes the model a sector of a cyclic structure.
+      type(cyclic_parts) :: cyclic
+      !> Harmonics that loads act in (m), and their cosine and sine parts (n_dof, m) [force].
+      integer, allocatable :: load_harmonic(:)
+      real(wp), allocatable :: harmonic_cosine(:, :), harmonic_sine(:, :)
+      !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
+      real(wp), allocatable :: coriolis(:, :)
+   contains
+      procedure :: order
+      procedure :: bind_parts
+   end type raw_model
+
+   character(*), parameter :: always = 'required', with_pairs = 'with /contact', &
+      with_springs = 'with /spring', with_mesh = 'with /mesh'
+
+contains
+
+   !> Number of dofs: of matrices of nodal diameters, the displacements in front.
+   pure integer function order(self)
+      class(raw_model), intent(in) :: self
+
+      order = self%cyclic%n_physical
+      if (allocated(self%stiffness)) order = size(self%stiffness, 1)
+   end function order
+
+   !> All parts, in the order of the documents: the first that has an extent gives it to those that
+   !> follow, the mass n_dof, side 1 of the pairs n_pairs.
+   subroutine bind_parts(self, to)
+      class(raw_model), intent(inout) :: self
+      class(part_source), intent(inout) :: to
+
+      call bind_structure(self, to)
+      call bind_pairs(self%contact, to)
+      call bind_springs(self%springs, to)
+      call bind_loads(self, to)
+      call bind_observed(self, to)
+      call self%cyclic%bind_parts(to)
+      call note_mesh(to)
+   end subroutine bind_parts
+
+   subroutine bind_structure(self, to)
+      class(raw_model), intent(inout) :: self
+      class(part_source), intent(inout) :: to
+
+      call to%note('text', part('@format', '', '"fretwear-model"', always))
+      call to%note('integer', part('@format_version', '', '1', always))
+      call to%bind(part('@title', '', 'of the result, where the case has none'), self%title)
+      call to%bind(part('@unit_system', '', 'such as mm-tonne-s-N: units of the result and of '// &
+                        'values with units'), self%unit_system)
+      call to%note('text', part('@parameters', '', 'what python -m fretwear.sector made it from'))
+      call to%note('text', part('@disk_parameters', '', 'what python -m fretwear.disk made '// &
+                                'it from'))
+      call to%bind(part('mass', 'dof dof', 'symmetric', always, either_way), self%mass)
+      call to%bind(part('stiffness', 'dof dof', 'symmetric', always, either_way), self%stiffness)
+      call to%bind(part('damping', 'dof dof', 'viscous, symmetric', storage=either_way), &
+                   self%damping)
+      call to%bind(part('stiffness_rotation', 'dof dof', 'added to the stiffness for each '// &
+                        '(rad/s)^2 of model%rotation_speed', storage=either_way), &
+                   self%stiffness_rotation)
+      call to%bind(part('coriolis', 'dof dof', 'skew: force of velocities for each rad/s of '// &
+                        'model%rotation_speed'), self%coriolis)
+   end subroutine bind_structure
+
+   subroutine bind_pairs(pairs, to)
+      type(contact_type), intent(inout) :: pairs
+      class(part_source), intent(inout) :: to
+      character(*), parameter :: each = 'one_or pair'
+      real(wp), allocatable :: values(:)
+      integer :: k
+
+      call to%bind(part('contact/side_1', 'pair 3', 'dof numbers of t1, t2, n, from 1: '// &
+                        'negative with the sign turned, 0 for none', with_pairs), pairs%side_1)
+      call to%bind(part('contact/side_2', 'pair 3', 'of the other side, 0: ground', with_pairs), &
+                   pairs%side_2)
+      call to%bind(part('contact/sector_2', 'pair', 'sector of side 2, counted from that of '// &
+                        'side 1'), pairs%sector_2)
+      call to%bind(part('contact/mu', each, 'friction coefficient'), pairs%mu)
+      call to%bind(part('contact/gap', each, 'initial gap; negative: interference'), pairs%gap)
+      call to%bind(part('contact/area', each, 'of a pair'), pairs%area)
+      call to%bind(part('contact/normal_load', each, 'constant compressive force of pairs '// &
+                        'without a normal dof'), pairs%normal_load)
+      do k = 1, size(to%constants)
+         associate (key => to%constants(k))
+            if (allocated(values)) deallocate (values)
+            call to%bind(part('contact/'//key%name, each, trim(key%help)//'; '//key%only), values)
+            if (allocated(values)) call pairs%constants%offer(trim(key%name), values)
+         end associate
+      end do
+      call to%note('text', part('contact@law', '', 'the law where the case names none'))
+      call to%bind(part('contact/position', 'pair 3', 'coordinates, for pictures', &
+                        storage=by_columns), pairs%position)
+      call to%bind(part('contact/patch', 'pair', 'name of the surface of each pair'), pairs%patch)
+   end subroutine bind_pairs
+
+   subroutine bind_springs(springs, to)
+      type(spring_type), intent(inout) :: springs
+      class(part_source), intent(inout) :: to
+      character(*), parameter :: each = 'one_or spring'
+
+      call to%bind(part('spring/side_1', 'spring', 'dof number from 1, signed', with_springs), &
+                   springs%side_1)
+      call to%bind(part('spring/side_2', each, '0, the ground, without it'), springs%side_2)
+      call to%bind(part('spring/sector_2', each, 'sector of side 2, counted from that of side '// &
+                        '1; 0 without it'), springs%sector_2)
+      call to%bind(part('spring/coefficient', each, 'force = coefficient * elongation**power', &
+                        with_springs), springs%coefficient)
+      call to%bind(part('spring/power', each, '3 without it'), springs%power)
+   end subroutine bind_springs
+
+   subroutine bind_loads(self, to)
+      class(raw_model), intent(inout) :: self
+      class(part_source), intent(inout) :: to
+      integer, allocatable :: found(:)
+      type(part_type) :: harmonics
+
+      call to%bind(part('load/static', 'dof', 'constant load'), self%load_static)
+      call to%bind(part('load/cosine', 'dof', 'in phase with cos(omega t)'), self%load_cosine)
+      call to%bind(part('load/sine', 'dof', 'in phase with sin(omega t)'), self%load_sine)
+      call to%bind(part('load/static_rotation', 'dof', 'constant load for each (rad/s)^2 of '// &
+                        'model%rotation_speed'), self%load_static_rotation)
+      harmonics = part('load/harmonic', 'load', 'harmonics 0, 1, .. of further loads')
+      call to%bind(harmonics, found)
+      if (allocated(found)) then
+         if (any(found < 0)) then
+            call to%refuse(harmonics, to_text(minval(found)), '0, 1, ..')
+         else
+            call move_alloc(found, self%load_harmonic)
+         end if
+      end if
+      ! Loads of no harmonics have no rows.
+      if (to%extent_of('load') == 0) return
+      call to%bind(part('load/harmonic_cosine', 'load dof', 'their cosine parts', &
+                        storage=by_columns), self%harmonic_cosine)
+      call to%bind(part('load/harmonic_sine', 'load dof', 'their sine parts', &
+                        storage=by_columns), self%harmonic_sine)
+   end subroutine bind_loads
+
+   subroutine bind_observed(self, to)
+      class(raw_model), intent(inout) :: self
+      class(part_source), intent(inout) :: to
+      integer, allocatable :: dof(:)
+      type(part_type) :: dofs
+      integer :: i, n
+
+      call to%bind(part('observe/name', 'quantity', 'names, with one of the two that follow', &
+                        'with /observe'), self%observe_name)
+      dofs = part('observe/dof', 'quantity', 'signed dof numbers')
+      call to%bind(dofs, dof)
+      call to%bind(part('observe/matrix', 'quantity dof', 'a linear combination of dofs each'), &
+                   self%observe_matrix)
+      if (.not. allocated(dof) .or. allocated(self%observe_matrix)) return
+      n = self%order()
+      allocate (self%observe_matrix(size(dof), n), source=0.0_wp)
+      do i = 1, size(dof)
+         if (dof(i) == 0 .or. abs(dof(i)) > n) then
+            call to%refuse(dofs, to_text(dof(i))//' at index '//to_text(i - 1), &
+                           '1 to '//to_text(n)//' or its negative')
+            return
+         end if
+         ! A negative number observes the dof with its sign turned.
+         self%observe_matrix(i, abs(dof(i))) = real(sign(1, dof(i)), wp)
+      end do
+   end subroutine bind_observed
+
+   !> What pictures are made of.
+   subroutine note_mesh(to)
+      class(part_source), intent(inout) :: to
+
+      call to%note('real', part('mesh/points', 'point 3', 'positions, for fretwear export', &
+                                with_mesh))
+      call to%note('integer', part('mesh/cells', 'cell 8', 'corners of the cells: points from '// &
+                                   '0 in the order of VTK, -1 behind the last one', with_mesh))
+      call to%note('integer', part('mesh/body', 'cell', 'body of each cell', with_mesh))
+      call to%note('integer', part('mesh/kind', 'cell', 'type of each cell by its number in '// &
+                                   'VTK: 5, 9, 10, 12, 13, 14; hexahedra (12) without it'))
+      call to%note('integer', part('mesh/facets', 'facet 4', 'facets in contact, points in '// &
+                                   'cyclic order', with_mesh))
+      call to%note('integer', part('mesh/pair', 'facet', 'pair of each facet, from 0', with_mesh))
+      call to%note('real', part('mesh/basis', '3_point dof', 'displacement x, y, z of point 0, '// &
+                                'then 1, .. per unit of each dof', with_mesh))
+   end subroutine note_mesh
+
+end module fw_raw_model
