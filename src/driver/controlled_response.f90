@@ -561,8 +561,7 @@ contains
       call summary%describe_sensitivity(derivatives)
       call self%sensitivity%remark(case, self%system, summary%remarks)
       call self%remark(state%n_points, summary%remarks)
-      call remark_undetermined(self%method%undetermined_at, self%method%undetermined_again, &
-                               summary%remarks)
+      call remark_undetermined(self%method%undetermined, summary%remarks)
       if (state%was_stopped .or. state%all_converged()) return
       message = 'not converged: for the reasons above'
       if (self%n_unexplained > 0) then

@@ -1,7 +1,7 @@
 !> Solve a balance with the solver that the case asks for, in the unknowns of its method.
 module fw_solution
    use fw_kinds, only: wp
-   use fw_case, only: case_type
+   use fw_case, only: analyses, case_type
    use fw_difference_system, only: difference_system, new_difference_system
    use fw_error, only: error_type
    use fw_flow, only: flow_system, new_flow
@@ -10,14 +10,17 @@ module fw_solution
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
+   use fw_idle_part, only: find_motion, put_to_rest
    use fw_kinsol, only: kinsol_solver
    use fw_newton, only: newton_solver, solver_report
    use fw_parameter_system, only: parameter_system
    use fw_powell, only: powell_solver
+   use fw_parameters, only: is_of_matrices
    use fw_problem, only: build_system
    use fw_pseudo_time, only: pseudo_report, pseudo_time_solver
    use fw_recovery, only: carry_solution
    use fw_unbounded, only: is_lost_in_round_off
+   use fw_undetermined, only: idle_motion, undetermined_note, undetermined_search
    use fw_slip_gap, only: lacks_friction
    use fw_solver_options, only: pseudo_time_options, jacobian_difference, solver_kinsol, &
       solver_powell
@@ -39,10 +42,10 @@ module fw_solution
       type(balance_state), allocatable :: whole
       !> A solution was refused because it grows without bound.
       logical :: unbounded = .false.
-      !> Where a motion was first taken for none because nothing determines it [rad/s], and whether
-      !> that was so at other frequencies too; below 0: nowhere.
-      real(wp) :: undetermined_at = -1.0_wp
-      logical :: undetermined_again = .false.
+      !> Motions that nothing determines, as springs and stuck pairs hold them, and what was taken
+      !> for none.
+      type(undetermined_search) :: search
+      type(undetermined_note) :: undetermined
       !> A solution was refused because its friction is ripple.
       logical :: rippled = .false.
       !> The system was evaluated last at the very solution that converged.
@@ -70,7 +73,24 @@ contains
       self%powell%options = case%solver
       self%kinsol%options = case%solver
       self%harmonics = harmonics
+      call start_search(self, case)
    end subroutine start
+
+   !> Where the matrices stay, and springs act in all harmonics.
+   subroutine start_search(self, case)
+      type(solution_method), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      !> Runs may leave their range of frequencies, by less than that.
+      real(wp), parameter :: beyond = 4.0_wp
+      real(wp) :: range(2)
+
+      if (is_of_matrices(case%varied) .or. is_of_matrices(case%resonance%parameter) .or. &
+          self%harmonics%filter_harmonics > 0) return
+      range = case%sweep%start
+      if (analyses(case%analysis)%is_sweep) range = case%sweep%range()
+      call self%search%start(case%model, case%contact, case%springs, &
+                             range*[1.0_wp/beyond, beyond*self%harmonics%n_harmonics])
+   end subroutine start_search
 
    !> From the guess in the coefficients x. What does not count as converged: forces whose march
    !> is not periodic, amplitudes without bound, and a position with every pair open of a
@@ -201,25 +221,49 @@ contains
    !> Take `converged` back from what solves the equations and is no vibration.
    subroutine refuse_unreal(self, system, x, report)
       class(solution_method), intent(inout) :: self
-      type(balance_state), intent(in) :: system
-      real(wp), intent(in), contiguous :: x(:)
+      type(balance_state), intent(inout) :: system
+      real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(inout) :: report
+      type(idle_motion), allocatable :: idle(:)
       logical :: lost, rippled
-      integer :: n_driven, n_idle
+      integer :: n_driven, n_idle, k
 
       call system%problem%structure%undetermined(system%structure_state, n_idle, n_driven)
-      lost = n_driven > 0 .or. is_lost_in_round_off(system, x)
+      call self%search%find(system, x, idle)
+      lost = n_driven > 0 .or. any(idle%is_driven) .or. is_lost_in_round_off(system, x)
       self%unbounded = self%unbounded .or. lost
       report%converged = is_lasting(system) .and. .not. lost
       if (.not. report%converged) return
       rippled = lacks_friction(system, x)
       self%rippled = self%rippled .or. rippled
       report%converged = .not. rippled
-      if (n_idle > 0 .and. report%converged) then
-         if (self%undetermined_at < 0.0_wp) self%undetermined_at = system%frequency()
-         self%undetermined_again = self%undetermined_again .or. &
-                                   abs(self%undetermined_at - system%frequency()) > 0.0_wp
-      end if
+      if (.not. report%converged) return
+      call rest(self, system, idle, x)
+      do k = 1, size(idle)
+         call self%undetermined%take(system%frequency(), merge( &
+            system%problem%fourier%harmonic(idle(k)%h), 0, idle(k)%is_held))
+      end do
+      if (n_idle > 0) call self%undetermined%take(system%frequency(), 0)
    end subroutine refuse_unreal
+
+   !> Motions that nothing determines are taken for none.
+   subroutine rest(self, system, idle, x)
+      class(solution_method), intent(inout) :: self
+      type(balance_state), intent(inout) :: system
+      type(idle_motion), intent(in) :: idle(:)
+      real(wp), intent(inout), contiguous :: x(:)
+      real(wp), allocatable :: r(:)
+      complex(wp), allocatable :: motion(:)
+      integer :: k
+
+      if (size(idle) == 0) return
+      do k = 1, size(idle)
+         call find_motion(system, x, idle(k)%h, motion)
+         call put_to_rest(system, idle(k)%h, motion - idle(k)%rest, x)
+      end do
+      allocate (r(size(x)))
+      call system%residual(x, r)
+      self%stands = .false.
+   end subroutine rest
 
 end module fw_solution
