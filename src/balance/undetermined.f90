@@ -170,10 +170,12 @@ contains
       complex(wp), allocatable, intent(out) :: found(:, :)
       real(wp), allocatable :: shapes(:, :), s_shapes(:, :)
       complex(wp), allocatable :: matrix(:, :), v(:, :)
+      integer, allocatable :: near(:)
       integer :: j
 
       associate (model => self%model, modes => self%modes)
-         shapes = modes%shapes(:, pack([(j, j=1, size(modes%values))], modes%are_near(s**2, around)))
+         near = pack([(j, j=1, size(modes%values))], modes%are_near(s**2, around))
+         shapes = modes%shapes(:, near)
          do j = 1, size(shapes, 2)
             shapes(:, j) = shapes(:, j)/sqrt(energy(sizes, cmplx(shapes(:, j), kind=wp)))
          end do

@@ -346,8 +346,8 @@ contains
       where_else = ''
       if (note%again) where_else = ', and at further frequencies,'
       met = ' a harmonic meets a mode without damping that neither contact nor load reaches'
-      if (note%harmonic > 0) met = ' harmonic '//to_text(note%harmonic)//' meets a mode without '// &
-         'damping that no load reaches, of the structure with its linear springs and stuck pairs'
+      if (note%harmonic > 0) met = ' harmonic '//to_text(note%harmonic)//' meets a mode without'// &
+         ' damping that no load reaches, of the structure with its linear springs and stuck pairs'
       call remarks%add('undetermined mode', 'at '//to_text(rounded(note%omega))//' rad/s'// &
          where_else//met//': its motion follows from nothing and is taken for none; set '// &
          'model%damping or model%modal_damping, or move the frequency')

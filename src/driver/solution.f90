@@ -214,8 +214,8 @@ contains
       report = outcome%solver_report
       if (allocated(self%message)) deallocate (self%message)
       if (.not. outcome%converged) self%message = outcome%message
-      call carry_solution(self%whole, whole_x, system, x)
       if (report%converged) call refuse_unreal(self, self%whole, whole_x, report)
+      call carry_solution(self%whole, whole_x, system, x)
    end subroutine solve_by_flow
 
    !> Take `converged` back from what solves the equations and is no vibration.
@@ -229,6 +229,8 @@ contains
       integer :: n_driven, n_idle, k
 
       call system%problem%structure%undetermined(system%structure_state, n_idle, n_driven)
+      ! A pair that nothing moves is left out, and holds the structure all the same.
+      if (self%search%is_needed .and. system%problem%joint%n_idle > 0) n_idle = 0
       call self%search%find(system, x, idle)
       lost = n_driven > 0 .or. any(idle%is_driven) .or. is_lost_in_round_off(system, x)
       self%unbounded = self%unbounded .or. lost
