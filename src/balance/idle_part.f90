@@ -1,4 +1,4 @@
-!> Motions of one harmonic in the dofs of the model, and what is to be left out of them.
+!> Motions of one harmonic in the dofs of the model, from and to the unknowns of a balance.
 module fw_idle_part
    use fw_balance_state, only: balance_state
    use fw_complex_form, only: amplitudes_of
@@ -8,7 +8,7 @@ module fw_idle_part
    implicit none (type, external)
    private
 
-   public :: find_motion, part_in, put_to_rest
+   public :: find_motion, part_in, add_motion
 
 contains
 
@@ -58,8 +58,8 @@ contains
       part = matmul(shapes, weights(:, 1))
    end function part_in
 
-   !> Take a motion of all dofs out of the coefficients of the coordinates.
-   subroutine put_to_rest(system, h, motion, x)
+   !> Add a motion of all dofs to the coefficients of the coordinates.
+   subroutine add_motion(system, h, motion, x)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: h
       complex(wp), intent(in) :: motion(:)
@@ -81,8 +81,8 @@ contains
          call lu%solve(columns(:, 1))
          call lu%solve(columns(:, 2))
          k = (structure%column(h) - 1)*m
-         x(k + 1:k + 2*m) = x(k + 1:k + 2*m) - [columns(:m, 1), columns(:m, 2)]
+         x(k + 1:k + 2*m) = x(k + 1:k + 2*m) + [columns(:m, 1), columns(:m, 2)]
       end select
-   end subroutine put_to_rest
+   end subroutine add_motion
 
 end module fw_idle_part

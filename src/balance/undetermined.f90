@@ -12,6 +12,9 @@
 !> no computation tells the two apart. Above, f = v^T (F - forces of slipping pairs) makes a motion
 !> f/sigma, which is known but for round-off of f, component by component, and for a part 1/delta
 !> of it. A coupling counts from the first bit on that those sums do not lose.
+!>
+!> Such a motion may be lost in the tolerance of the solver: 1/sigma of its residual. It is found
+!> from the residual in these few modes, which their singular values solve.
 module fw_undetermined
    use fw_balance_state, only: balance_state
    use fw_contact_data, only: contact_type, spring_type
@@ -46,8 +49,9 @@ module fw_undetermined
       !> Place of the harmonic, and motions in the dofs of the model (n_dof, n).
       integer :: h = 0
       complex(wp), allocatable :: shapes(:, :)
-      !> What is left of the present motion without them (n_dof).
-      complex(wp), allocatable :: rest(:)
+      !> The present motion, what is left of it without them, and what is to be added to it
+      !> (n_dof).
+      complex(wp), allocatable :: present(:), rest(:), change(:)
       !> A load acts on one of them; springs or stuck pairs move in one of them.
       logical :: is_driven = .false., is_held = .false.
    end type idle_motion
@@ -70,8 +74,10 @@ module fw_undetermined
    real(wp), parameter :: load_round_off = 8.0_wp*epsilon(1.0_wp), no_load = 1.0e-13_wp
    !> Part of the largest displacement to which a motion has to be known.
    real(wp), parameter :: known = 1.0e-2_wp
-   !> Parts of theta within which modes are looked at, and are taken along.
-   real(wp), parameter :: at_hand = 1.0e-9_wp, around = 1.0e-4_wp
+   !> Part of theta within which modes are looked at: beyond, what tolerances leave is little.
+   real(wp), parameter :: around = 1.0e-4_wp
+   !> Part of the largest displacement from which on a motion is corrected.
+   real(wp), parameter :: noticed = 1.0e-4_wp
    !> Dofs up to which the modes take little time beside the rest of a run.
    integer, parameter :: most_dofs = 400
 
@@ -131,9 +137,9 @@ contains
          do h = 1, fourier%n_retained
             if (fourier%harmonic(h) == 0) cycle
             theta = (fourier%harmonic(h)*system%frequency())**2
-            if (.not. any(self%modes%are_near(theta, at_hand))) cycle
+            if (.not. any(self%modes%are_near(theta, around))) cycle
             call look_at(self, system, x, rows, h, motion)
-            if (size(motion%shapes, 2) > 0) found = [found, motion]
+            if (allocated(motion%change)) found = [found, motion]
          end do
       end associate
    end subroutine find
@@ -146,28 +152,33 @@ contains
       integer, intent(in) :: h
       type(idle_motion), intent(out) :: motion
       real(wp), allocatable :: values(:), delta(:), sizes(:, :)
+      complex(wp), allocatable :: left(:, :)
+      logical, allocatable :: unknown(:)
+      integer, allocatable :: weak(:)
       real(wp) :: s
       integer :: j
 
       s = system%problem%fourier%harmonic(h)*system%frequency()
       sizes = self%modes%sizes + s**2*abs(self%model%mass) + s*abs(self%model%damping)
-      call find_least(self, rows, s, sizes, values, motion%shapes)
+      call find_least(self, rows, s, sizes, values, motion%shapes, left)
       delta = [(values(j)/(epsilon(1.0_wp)*energy(sizes, motion%shapes(:, j))), &
                 j=1, size(values))]
+      weak = pack([(j, j=1, size(delta))], delta*epsilon(1.0_wp) <= around)
+      if (size(weak) == 0) return
       motion%h = h
-      motion%shapes = motion%shapes(:, pack([(j, j=1, size(delta))], delta <= most_delta))
-      values = pack(values, delta <= most_delta)
-      delta = pack(delta, delta <= most_delta)
-      if (size(values) > 0) call judge(self, system, x, rows, sizes, values, delta, motion)
+      motion%shapes = motion%shapes(:, weak)
+      call judge(self, system, x, rows, sizes, values(weak), delta(weak), motion, unknown)
+      call correct(self, system, rows, s, values(weak), left(:, weak), unknown, motion)
    end subroutine look_at
 
-   !> Singular values of S + i D among the modes near theta, and what they belong to.
-   subroutine find_least(self, rows, s, sizes, values, found)
+   !> Singular values of S + i D among the modes near theta, what they belong to, and rows that make
+   !> the square of the value times its motion of a residual.
+   subroutine find_least(self, rows, s, sizes, values, found, left)
       type(undetermined_search), intent(in) :: self
       type(dof_row), intent(in) :: rows(:)
       real(wp), intent(in) :: s, sizes(:, :)
       real(wp), allocatable, intent(out) :: values(:)
-      complex(wp), allocatable, intent(out) :: found(:, :)
+      complex(wp), allocatable, intent(out) :: found(:, :), left(:, :)
       real(wp), allocatable :: shapes(:, :), s_shapes(:, :)
       complex(wp), allocatable :: matrix(:, :), v(:, :)
       integer, allocatable :: near(:)
@@ -191,23 +202,27 @@ contains
       allocate (values(size(shapes, 2)), v(size(shapes, 2), size(shapes, 2)))
       call singular_vectors(matrix, values, v)
       found = matmul(shapes, v)
+      left = matmul(shapes, conjg(matmul(matrix, v)))
    end subroutine find_least
 
-   !> Keep what is not known, with what acts on it.
-   subroutine judge(self, system, x, rows, sizes, values, delta, motion)
+   !> Which of the shapes are not known, and whether loads act on them.
+   subroutine judge(self, system, x, rows, sizes, values, delta, motion, unknown)
       type(undetermined_search), intent(in) :: self
       type(balance_state), intent(inout) :: system
       real(wp), intent(in), contiguous :: x(:)
       type(dof_row), intent(in) :: rows(:)
       real(wp), intent(in) :: sizes(:, :), values(:), delta(:)
       type(idle_motion), intent(inout) :: motion
+      logical, allocatable, intent(out) :: unknown(:)
       complex(wp) :: load(self%model%n_dof)
-      logical :: unknown(size(values))
       real(wp) :: force, least, noise, size_of_rest, sums
       integer :: j
 
+      allocate (unknown(size(values)))
       call find_load(self, system, rows, motion%h, load)
-      call find_rest(self, system, x, motion)
+      call find_motion(system, x, motion%h, motion%present)
+      motion%rest = motion%present - part_in(self%model%mass, motion%shapes(:, pack( &
+         [(j, j=1, size(delta))], delta <= most_delta)), motion%present)
       size_of_rest = maxval(abs(motion%rest))
       least = 1.0_wp + 0.5_wp*sqrt(real(self%model%n_dof, wp))
       do j = 1, size(values)
@@ -215,17 +230,64 @@ contains
             force = abs(sum(v*load))
             sums = dot_product(abs(v), abs(load) + matmul(sizes, abs(motion%rest)))
             noise = load_round_off*sums
-            unknown(j) = delta(j) <= least .or. max(noise, force/delta(j))*maxval(abs(v)) > &
-                         known*values(j)*size_of_rest
+            unknown(j) = delta(j) <= least .or. (delta(j) <= most_delta .and. &
+                         max(noise, force/delta(j))*maxval(abs(v)) > known*values(j)*size_of_rest)
+            if (.not. unknown(j)) cycle
             ! Where v is zero round-off is left of it.
-            motion%is_driven = motion%is_driven .or. (unknown(j) .and. force > no_load*sums + &
-                               load_round_off*maxval(abs(v))*sum(abs(load)))
-            if (unknown(j)) motion%is_held = motion%is_held .or. strains(v, rows)
+            motion%is_driven = motion%is_driven .or. force > no_load*sums + &
+                               load_round_off*maxval(abs(v))*sum(abs(load))
+            motion%is_held = motion%is_held .or. strains(v, rows)
          end associate
       end do
-      motion%shapes = motion%shapes(:, pack([(j, j=1, size(values))], unknown))
-      call find_rest(self, system, x, motion)
    end subroutine judge
+
+   !> Motions that are not known come to rest, and the others to what they are. Left is what is not
+   !> known.
+   subroutine correct(self, system, rows, s, values, left, unknown, motion)
+      type(undetermined_search), intent(in) :: self
+      type(balance_state), intent(in) :: system
+      type(dof_row), intent(in) :: rows(:)
+      real(wp), intent(in) :: s, values(:)
+      complex(wp), intent(in) :: left(:, :)
+      logical, intent(in) :: unknown(:)
+      type(idle_motion), intent(inout) :: motion
+      complex(wp), dimension(self%model%n_dof) :: added, residual
+      integer :: j
+
+      call find_residual(self, system, rows, s, motion, residual)
+      added = (0.0_wp, 0.0_wp)
+      do j = 1, size(values)
+         if (.not. unknown(j)) added = added + &
+                                       motion%shapes(:, j)*(sum(left(:, j)*residual)/values(j)**2)
+      end do
+      if (maxval(abs(added)) <= noticed*maxval(abs(motion%present + added))) added = 0.0_wp
+      motion%shapes = motion%shapes(:, pack([(j, j=1, size(values))], unknown))
+      motion%rest = motion%present - part_in(self%model%mass, motion%shapes, motion%present)
+      if (any(unknown) .or. maxval(abs(added)) > 0.0_wp) &
+         motion%change = motion%rest - motion%present + added
+   end subroutine correct
+
+   !> Loads less the forces of the present motion; those that hold rigid pairs are left out, as no
+   !> shape moves them.
+   subroutine find_residual(self, system, rows, s, motion, residual)
+      type(undetermined_search), intent(in) :: self
+      type(balance_state), intent(in) :: system
+      type(dof_row), intent(in) :: rows(:)
+      real(wp), intent(in) :: s
+      type(idle_motion), intent(in) :: motion
+      complex(wp), intent(out) :: residual(:)
+      real(wp), dimension(size(residual), 2) :: parts, forces
+      integer :: i
+
+      call find_load(self, system, rows, motion%h, residual)
+      parts = reshape([real(motion%present, wp), aimag(motion%present)], shape(parts))
+      forces = matmul(self%modes%stiffness, parts) - s**2*matmul(self%model%mass, parts)
+      do i = 1, size(rows)
+         if (rows(i)%is_mixed .and. .not. rows(i)%is_held) call rows(i)%take_from(parts, forces)
+      end do
+      residual = residual - cmplx(forces(:, 1), forces(:, 2), wp) - &
+                 cmplx(0.0_wp, s, wp)*matmul(self%model%damping, motion%present)
+   end subroutine find_residual
 
    !> F less the forces of what is mixed, of one harmonic in the dofs.
    subroutine find_load(self, system, rows, h, load)
@@ -247,17 +309,6 @@ contains
             rows(i)%element, rows(i)%component, k:k + 1), load)
       end do
    end subroutine find_load
-
-   !> The motion of a harmonic, without its part in the shapes: orthogonal to them by the mass.
-   subroutine find_rest(self, system, x, motion)
-      type(undetermined_search), intent(in) :: self
-      type(balance_state), intent(inout) :: system
-      real(wp), intent(in), contiguous :: x(:)
-      type(idle_motion), intent(inout) :: motion
-
-      call find_motion(system, x, motion%h, motion%rest)
-      motion%rest = motion%rest - part_in(self%model%mass, motion%shapes, motion%rest)
-   end subroutine find_rest
 
    !> |v|^T sizes |v|
    pure real(wp) function energy(sizes, v)

@@ -484,7 +484,8 @@ contains
          end if
          report%converged = .false.
       end do
-      if (report%converged) call self%method%refuse(self%system, self%y(:n), report)
+      if (report%converged) call self%method%refuse(self%system, self%y(:n), &
+                                                       report, keeps=.true.)
       ! What is observed is round-off of what moves elsewhere.
       if (self%control%size_of_motion() <= at_rest*norm2(self%y(:n))) report%converged = .false.
    end subroutine attempt

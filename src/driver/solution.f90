@@ -10,11 +10,12 @@ module fw_solution
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_idle_part, only: find_motion, put_to_rest
+   use fw_idle_part, only: add_motion
    use fw_kinsol, only: kinsol_solver
    use fw_newton, only: newton_solver, solver_report
    use fw_parameter_system, only: parameter_system
    use fw_powell, only: powell_solver
+   use fw_norm, only: norm_of
    use fw_parameters, only: is_of_matrices
    use fw_problem, only: build_system
    use fw_pseudo_time, only: pseudo_report, pseudo_time_solver
@@ -46,6 +47,8 @@ module fw_solution
       !> for none.
       type(undetermined_search) :: search
       type(undetermined_note) :: undetermined
+      !> A solution left its tolerance where motions near a mode without damping were corrected.
+      logical, private :: left_tolerance = .false.
       !> A solution was refused because its friction is ripple.
       logical :: rippled = .false.
       !> The system was evaluated last at the very solution that converged.
@@ -103,20 +106,30 @@ contains
       type(formulation_type), target :: formulation
       class(parameter_system), pointer :: solved
       real(wp), allocatable :: unknowns(:)
+      integer :: iterations, trial
 
+      iterations = 0
       call formulation%begin(system)
       solved => formulation%as_solved()
       allocate (unknowns(system%n))
       call formulation%from_coefficients(x, unknowns)
-      call solve_system(self, solved, unknowns, report)
-      call formulation%to_coefficients(unknowns, x)
-      ! Newton's method evaluates what it accepts last; other solvers, and formulations with
-      ! unknowns of their own, may have been elsewhere.
-      self%stands = report%converged .and. self%kind /= solver_powell .and. &
-                    self%kind /= solver_kinsol .and. &
-                    self%newton%options%jacobian /= jacobian_difference
-      if (self%stands) self%stands = all(abs(unknowns - x) <= 0.0_wp)
-      if (report%converged) call refuse_unreal(self, system, x, report)
+      do trial = 1, 2
+         call solve_system(self, solved, unknowns, report)
+         report%iterations = report%iterations + iterations
+         call formulation%to_coefficients(unknowns, x)
+         ! Newton's method evaluates what it accepts last; other solvers, and formulations with
+         ! unknowns of their own, may have been elsewhere.
+         self%stands = report%converged .and. self%kind /= solver_powell .and. &
+                       self%kind /= solver_kinsol .and. &
+                       self%newton%options%jacobian /= jacobian_difference
+         if (self%stands) self%stands = all(abs(unknowns - x) <= 0.0_wp)
+         self%left_tolerance = .false.
+         if (report%converged) call refuse_unreal(self, system, x, report)
+         if (.not. self%left_tolerance) exit
+         ! From the motion that the residual of the first solution did not tell.
+         iterations = report%iterations
+         call formulation%from_coefficients(x, unknowns)
+      end do
    end subroutine solve
 
    !> Whether the point that was evaluated last can last: its forces repeat from period to period,
@@ -219,53 +232,59 @@ contains
    end subroutine solve_by_flow
 
    !> Take `converged` back from what solves the equations and is no vibration.
-   subroutine refuse_unreal(self, system, x, report)
+   subroutine refuse_unreal(self, system, x, report, keeps)
       class(solution_method), intent(inout) :: self
       type(balance_state), intent(inout) :: system
       real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(inout) :: report
+      !> Leave x, which has further conditions, as it is.
+      logical, intent(in), optional :: keeps
       type(idle_motion), allocatable :: idle(:)
-      logical :: lost, rippled
+      logical :: lost, moves, rippled
       integer :: n_driven, n_idle, k
 
       call system%problem%structure%undetermined(system%structure_state, n_idle, n_driven)
       ! A pair that nothing moves is left out, and holds the structure all the same.
       if (self%search%is_needed .and. system%problem%joint%n_idle > 0) n_idle = 0
       call self%search%find(system, x, idle)
-      lost = n_driven > 0 .or. any(idle%is_driven) .or. is_lost_in_round_off(system, x)
+      lost = n_driven > 0 .or. any(idle%is_driven)
+      moves = size(idle) > 0 .and. .not. lost
+      if (present(keeps)) moves = moves .and. .not. keeps
+      if (moves) call take_changes(self, system, idle, x, report)
+      lost = lost .or. is_lost_in_round_off(system, x)
       self%unbounded = self%unbounded .or. lost
-      report%converged = is_lasting(system) .and. .not. lost
+      report%converged = is_lasting(system) .and. .not. (lost .or. self%left_tolerance)
+      self%left_tolerance = self%left_tolerance .and. .not. lost
       if (.not. report%converged) return
       rippled = lacks_friction(system, x)
       self%rippled = self%rippled .or. rippled
       report%converged = .not. rippled
       if (.not. report%converged) return
-      call rest(self, system, idle, x)
       do k = 1, size(idle)
-         call self%undetermined%take(system%frequency(), merge( &
+         if (size(idle(k)%shapes, 2) > 0) call self%undetermined%take(system%frequency(), merge( &
             system%problem%fourier%harmonic(idle(k)%h), 0, idle(k)%is_held))
       end do
       if (n_idle > 0) call self%undetermined%take(system%frequency(), 0)
    end subroutine refuse_unreal
 
-   !> Motions that nothing determines are taken for none.
-   subroutine rest(self, system, idle, x)
+   !> Motions that nothing determines come to rest, and those that the tolerance hides to what they
+   !> are.
+   subroutine take_changes(self, system, idle, x, report)
       class(solution_method), intent(inout) :: self
       type(balance_state), intent(inout) :: system
       type(idle_motion), intent(in) :: idle(:)
       real(wp), intent(inout), contiguous :: x(:)
-      real(wp), allocatable :: r(:)
-      complex(wp), allocatable :: motion(:)
+      type(solver_report), intent(inout) :: report
+      real(wp) :: r(size(x))
       integer :: k
 
-      if (size(idle) == 0) return
       do k = 1, size(idle)
-         call find_motion(system, x, idle(k)%h, motion)
-         call put_to_rest(system, idle(k)%h, motion - idle(k)%rest, x)
+         call add_motion(system, idle(k)%h, idle(k)%change, x)
       end do
-      allocate (r(size(x)))
       call system%residual(x, r)
+      report%residual = norm_of(r)/system%reference
       self%stands = .false.
-   end subroutine rest
+      self%left_tolerance = .not. report%residual <= self%newton%options%tolerance
+   end subroutine take_changes
 
 end module fw_solution
