@@ -263,8 +263,9 @@ contains
       if (maxval(abs(added)) <= noticed*maxval(abs(motion%present + added))) added = 0.0_wp
       motion%shapes = motion%shapes(:, pack([(j, j=1, size(values))], unknown))
       motion%rest = motion%present - part_in(self%model%mass, motion%shapes, motion%present)
-      if (any(unknown) .or. maxval(abs(added)) > 0.0_wp) &
+      if (any(unknown) .or. maxval(abs(added)) > 0.0_wp) then
          motion%change = motion%rest - motion%present + added
+      end if
    end subroutine correct
 
    !> Loads less the forces of the present motion; those that hold rigid pairs are left out, as no
