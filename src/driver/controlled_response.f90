@@ -484,7 +484,8 @@ contains
          end if
          report%converged = .false.
       end do
-      if (report%converged) call self%method%refuse(self%system, self%y(:n), report)
+      if (report%converged) call self%method%refuse(self%system, self%y(:n), &
+                                                       report, keeps=.true.)
       ! What is observed is round-off of what moves elsewhere.
       if (self%control%size_of_motion() <= at_rest*norm2(self%y(:n))) report%converged = .false.
    end subroutine attempt
@@ -561,8 +562,7 @@ contains
       call summary%describe_sensitivity(derivatives)
       call self%sensitivity%remark(case, self%system, summary%remarks)
       call self%remark(state%n_points, summary%remarks)
-      call remark_undetermined(self%method%undetermined_at, self%method%undetermined_again, &
-                               summary%remarks)
+      call remark_undetermined(self%method%undetermined, summary%remarks)
       if (state%was_stopped .or. state%all_converged()) return
       message = 'not converged: for the reasons above'
       if (self%n_unexplained > 0) then

@@ -91,9 +91,8 @@ contains
       end do
       call summary%describe_work(levels(largest)%system, work, kind, all_converged)
       do k = 1, n
-         if (.not. levels(k)%solver%method%undetermined_at > 0.0_wp) cycle
-         call remark_undetermined(levels(k)%solver%method%undetermined_at, &
-                                  levels(k)%solver%method%undetermined_again, summary%remarks)
+         if (.not. levels(k)%solver%method%undetermined%omega > 0.0_wp) cycle
+         call remark_undetermined(levels(k)%solver%method%undetermined, summary%remarks)
          exit
       end do
    end subroutine describe_levels

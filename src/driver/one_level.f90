@@ -111,8 +111,7 @@ contains
          call solver%sensitivity%describe(derivatives)
          call summary%describe_sensitivity(derivatives)
          call solver%sensitivity%remark(case, system, summary%remarks)
-         call remark_undetermined(solver%method%undetermined_at, &
-                                  solver%method%undetermined_again, summary%remarks)
+         call remark_undetermined(solver%method%undetermined, summary%remarks)
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
          if (self%n_elsewhere > 0) call summary%note_elsewhere(self%n_elsewhere, self%way)
          if (state%was_stopped .or. state%all_converged()) return

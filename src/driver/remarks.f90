@@ -14,6 +14,7 @@ module fw_remarks
    use fw_result_group, only: group_writer, result_group
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
+   use fw_undetermined, only: undetermined_note
    implicit none (type, external)
    private
 
@@ -336,22 +337,21 @@ contains
          'solver%tolerance, or compare with a natural sweep')
    end subroutine remark_condensed
 
-   !> Of modes that are met, not damped, and neither coupled nor loaded.
-   subroutine remark_undetermined(omega, again, remarks)
-      !> Where that was first [rad/s]; below 0: nowhere.
-      real(wp), intent(in) :: omega
-      !> Whether it was so elsewhere too.
-      logical, intent(in) :: again
+   !> Of modes that are met, not damped, and not loaded.
+   subroutine remark_undetermined(note, remarks)
+      type(undetermined_note), intent(in) :: note
       type(remark_list), intent(inout) :: remarks
-      character(:), allocatable :: where_else
+      character(:), allocatable :: where_else, met
 
-      if (omega < 0.0_wp) return
+      if (note%omega < 0.0_wp) return
       where_else = ''
-      if (again) where_else = ', and at further frequencies,'
-      call remarks%add('undetermined mode', 'at '//to_text(rounded(omega))//' rad/s'//where_else// &
-         ' a harmonic meets a mode without damping that neither contact nor load reaches: its '// &
-         'motion follows from nothing and is taken for none; set model%damping or '// &
-         'model%modal_damping, or move the frequency')
+      if (note%again) where_else = ', and at further frequencies,'
+      met = ' a harmonic meets a mode without damping that neither contact nor load reaches'
+      if (note%harmonic > 0) met = ' harmonic '//to_text(note%harmonic)//' meets a mode without'// &
+         ' damping that no load reaches, of the structure with its linear springs and stuck pairs'
+      call remarks%add('undetermined mode', 'at '//to_text(rounded(note%omega))//' rad/s'// &
+         where_else//met//': its motion follows from nothing and is taken for none; set '// &
+         'model%damping or model%modal_damping, or move the frequency')
    end subroutine remark_undetermined
 
    !> Of verdicts on stability that nothing stands behind.

@@ -99,8 +99,7 @@ contains
       if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
       call observer%limit_point(0.0_wp)
       if (allocated(point%note)) call observer%on_message(point%note)
-      call remark_undetermined(run%solver%method%undetermined_at, &
-                               run%solver%method%undetermined_again, summary%remarks)
+      call remark_undetermined(run%solver%method%undetermined, summary%remarks)
       if (point%converged) then
          call start_march(run, case, point, error)
          if (.not. allocated(error)) call march_on(run, restart, error)

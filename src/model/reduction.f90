@@ -39,6 +39,8 @@ module fw_reduction
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       real(wp), allocatable :: observe_q(:, :), observe_i(:, :)
       type(load_waves) :: waves
+      !> The basis itself, [T_q, T_i]; only of few dofs (n_dof, n_dof).
+      real(wp), allocatable :: basis(:, :)
       !> Changes of K and C by parameters of the model, rows and columns of the coordinates, then of
       !> the internal modes (n, n, n_changes), and of the static load (n, n_changes); not allocated
       !> where none was asked for.
@@ -66,6 +68,8 @@ module fw_reduction
    real(wp), parameter :: mode_round_off = 1.0e-13_wp
    !> Couplings of a mode are none beside its own stiffness, mass or critical damping.
    real(wp), parameter :: own_round_off = 1.0e-12_wp
+   !> Dofs up to which the basis is kept: it takes no room worth mentioning.
+   integer, parameter :: most_kept = 400
    !> Relative stiffness below which an internal mode is free.
    real(wp), parameter :: free_stiffness = 1.0e-11_wp
 
@@ -116,6 +120,7 @@ contains
       end if
       self%kept = pack([(j, j=1, size(keep))], keep)
       call clear_round_off(model, t_q, t_i, self)
+      if (model%n_dof <= most_kept) self%basis = reshape([t_q, t_i], [model%n_dof, model%n_dof])
       if (allocated(model%changes)) call transform_changes(model, t_q, t_i, self)
    end subroutine new_reduction
 

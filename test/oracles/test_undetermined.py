@@ -158,6 +158,79 @@ def test_equal_parts_that_a_weak_spring_joins_are_coupled(tmp_path, joining):
     assert found[1] == pytest.approx(expected, abs=1e-2 * np.abs(expected).max())
 
 
+def held_part(joint, **keys):
+    """A damped part that rubs, and a mass of frequency 3 beside it, held by what `joint` says."""
+    return {"model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 1.0],
+                      "stiffness": [1.25, 0.0, 0.0, keys.pop("stiffness", 0.0)],
+                      "damping": [0.0625, 0.0, 0.0, keys.pop("damping", 0.0)]},
+            "load": {"cosine": [1.0, keys.pop("load", 0.0)]},
+            "harmonics": {"n_harmonics": 3, "parity": "all"}, **HELD[joint]}
+
+
+#: What holds the mass: a spring, or a pair that sticks.
+HELD = {
+    "spring": {
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 0], "mu": 1.0,
+                    "normal_load": 0.5, "tangential_stiffness": 2.0},
+        "spring": {"n_springs": 1, "side_1": 2, "coefficient": 9.0, "power": 1}},
+    "pair": {
+        "contact": {"n_pairs": 2, "law": "penalty", "side_1": [1, 0, 0, 2, 0, 0],
+                    "mu": [1.0, 1.0], "normal_load": [0.5, 100.0],
+                    "tangential_stiffness": [2.0, 8.0]}}}
+#: What the matrix adds to it.
+REST = {"spring": 0.0, "pair": 1.0}
+
+
+def said(folder, case, status=0):
+    """Texts of the remark, and whether all points converged."""
+    run(folder, case, status=status)
+    found = read(folder / "case.h5")
+    return [text.decode() for name, text in zip(found.get("remarks/name", []),
+                                                found.get("remarks/text", []), strict=True)
+            if name == b"undetermined mode"], found
+
+
+@pytest.mark.parametrize("joint", HELD)
+def test_a_mode_that_springs_or_stuck_pairs_hold(tmp_path, joint):
+    """The harmonic is named; a bit of damping or of the frequency determines the motion."""
+    case = held_part(joint, stiffness=REST[joint])
+    told, found = said(tmp_path, {"case": {"analysis": "point"}, **case, "sweep": {"start": 1.0}})
+    assert len(told) == 1
+    assert "harmonic 3 meets" in told[0]
+    assert "linear springs and stuck pairs" in told[0]
+    assert found["coefficients"][0][:, 1] == pytest.approx(0.0, abs=CLOSE)
+    told, _ = said(tmp_path, {"case": {"analysis": "point"}, **case,
+                              "sweep": {"start": 1.0 + 1e-12}})
+    assert not told
+    damped = held_part(joint, stiffness=REST[joint], damping=1e-12)
+    told, _ = said(tmp_path, {"case": {"analysis": "point"}, **damped, "sweep": {"start": 1.0}})
+    assert not told
+
+
+@pytest.mark.parametrize("joint", HELD)
+def test_sweeps_and_controls_say_so(tmp_path, joint):
+    """The second of three frequencies meets it; an amplitude that is given at the first mass."""
+    case = held_part(joint, stiffness=REST[joint])
+    sweep = {"sweep": {"start": 0.75, "end": 1.25, "n_points": 3}}
+    told, _ = said(tmp_path, {"case": {"analysis": "frf"}, **case, **sweep})
+    assert "at 1.00000 rad/s harmonic 3" in told[0]
+    told, _ = said(tmp_path, {"case": {"analysis": "frf"}, **case, **sweep,
+                              "output": {"observe": [1]},
+                              "control": {"of": "largest", "amplitude": 0.5}}, status=(0, 4))
+    assert "at 1.00000 rad/s harmonic 3" in told[0]
+
+
+def test_a_load_on_a_held_mode_fails(tmp_path):
+    """As one on a mode of the structure alone."""
+    case = held_part("spring", load=1e-3)
+    case["model"]["stiffness"][0] = 2.25
+    case["spring"]["coefficient"] = 1.0
+    told, found = said(tmp_path, {"case": {"analysis": "point"}, **case, "sweep": {"start": 1.0}},
+                       status=4)
+    assert not told
+    assert not found["converged"][0]
+
+
 def test_wear_says_so_too(tmp_path):
     """A pair that wears on one dof, and an oscillator beside it."""
     run(tmp_path, {
