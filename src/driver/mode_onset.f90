@@ -50,8 +50,8 @@ module fw_mode_onset
    !> Ratios of two amplitudes between which the onset is known well enough: about positions in a
    !> line, and about a position that is known.
    real(wp), parameter :: near = 1.0_wp + 1.0e-3_wp, fine = 1.0_wp + 1.0e-13_wp
-   !> What the bound is known to.
-   real(wp), parameter :: beside = 1.0_wp + 1.0e-5_wp
+   !> What the bound is known to, and what is clearly beside it.
+   real(wp), parameter :: known = 1.0_wp + 3.0e-6_wp, beside = 1.0_wp + 1.0e-5_wp
 
 contains
 
@@ -186,7 +186,9 @@ contains
                end if
             else if (highest > found%bound) then
                search%high = beside*found%bound
-               found%amplitude = min(found%bound, search%between(system))
+               found%amplitude = search%between(system)
+               ! About positions in a line it is known to all digits, but for what slides unseen.
+               if (found%amplitude > known*found%bound) found%amplitude = found%bound
                found%known_by = onset_at_bound
             end if
          end if
