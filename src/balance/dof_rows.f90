@@ -91,8 +91,8 @@ contains
             row%is_mixed = row%is_mixed .and. .not. work%always_closed(i)
          end if
          associate (p => entry%law%prediction)
-            row%is_held = p%takes_balance
-            if (p%takes_balance .or. p%order(c) > 0) return
+            row%is_held = p%takes(i)
+            if (p%takes(i) .or. p%order_of(i, c) > 0) return
             row%stiffness = p%stiffness(i, c)
             if (entry%row(c, i) > 0) return
          end associate

@@ -4,39 +4,40 @@
 !> pair vibrates may move: under a static load it slips in the first turns, not in the cycle, and
 !> shakes down to another one, in one direction in proportion to the amplitude while nothing else
 !> begins to. So no position of before says where the onset is: it lies between two solutions, of
-!> which the lower is stuck and the other, just above, is not. Positions in a straight line through
-!> two stuck ones say where to look, and what is left between the two.
+!> which the lower is stuck and the other, just above, is not.
+!>
+!> Where the stuck motion has a bound (fw_onset_bound) it is followed up to there, from the first
+!> solution and by none of the curve's steps (fw_onset_climb). Where it has none, solutions of the
+!> curve are where to begin, and positions in a straight line through two stuck ones say where to
+!> look.
 module fw_mode_onset
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_mode_group, only: onset_at_bound, onset_below, onset_every, onset_none, onset_solutions, &
+      onset_stuck, onset_type
    use fw_mode_path, only: mode_path
    use fw_mode_system, only: mode_system
    use fw_newton, only: solver_report
    use fw_onset_bound, only: find_bound
    use fw_onset_bracket, only: onset_bracket
-   use fw_onset_departure, only: evaluate_motion, onset_departure
+   use fw_onset_climb, only: climb
+   use fw_onset_departure, only: evaluate_motion
+   use fw_onset_search, only: coarse, onset_search
    implicit none (type, external)
    private
 
    public :: onset_finder
 
-   type :: onset_finder
-      !> Amplitudes at which the motion is stuck, the highest first, their unknowns (n, 2) and how
-      !> many there are; the lowest at which it is not, once there is one.
-      real(wp), private :: low(2) = 0.0_wp, high = huge(1.0_wp)
-      real(wp), allocatable, private :: y(:, :)
-      integer, private :: n_low = 0
-      !> A solution that is not stuck, its amplitude, and whether there is one.
-      real(wp), allocatable, private :: y_above(:)
-      real(wp), private :: above = huge(1.0_wp)
+   type, extends(onset_search) :: onset_finder
+      !> The first stuck solution, and its amplitude.
+      real(wp), allocatable, private :: first_y(:)
+      real(wp), private :: first = 0.0_wp
+      !> Whether a solution of the curve is not stuck, and how many have been noted since.
       logical, private :: departed = .false.
-      !> What departs in solutions above the onset, to begin a search with: shares and sliding.
-      type(onset_bracket), private :: shares, sliding
       integer, private :: n_above = 0
-      !> Whether the bound is known, so that what does not converge needs no more trials.
-      logical, private :: bounded = .false.
-      type(onset_departure), private :: departure
+      !> Shares that change in solutions above the onset.
+      type(onset_bracket), private :: shares
    contains
       procedure :: begin
       procedure :: is_stuck
@@ -47,11 +48,10 @@ module fw_mode_onset
    !> Amplitude over the lowest one at which the motion is that near rest.
    real(wp), parameter :: near_rest = 1.0e-6_wp
    !> Ratios of two amplitudes between which the onset is known well enough: about positions in a
-   !> line, by solutions, and about a position that is known.
-   real(wp), parameter :: near = 1.0_wp + 1.0e-3_wp, coarse = 1.0_wp + 1.0e-4_wp, &
-                          fine = 1.0_wp + 1.0e-13_wp
-   !> What the bound is known to.
-   real(wp), parameter :: beside = 1.0_wp + 1.0e-5_wp
+   !> line, and about a position that is known.
+   real(wp), parameter :: near = 1.0_wp + 1.0e-3_wp, fine = 1.0_wp + 1.0e-13_wp
+   !> What the bound is known to, and what is clearly beside it.
+   real(wp), parameter :: known = 1.0_wp + 3.0e-6_wp, beside = 1.0_wp + 1.0e-5_wp
 
 contains
 
@@ -109,112 +109,113 @@ contains
       amplitude = system%amplitude
       departed = self%departure%by_sliding(system, amplitude, y)
       if (departed > 0.0_wp .or. self%departed) then
-         if (.not. self%departed) call take_above(self, system, y)
+         if (.not. self%departed) call self%take_above(system, y)
          self%departed = .true.
          self%n_above = self%n_above + 1
          call self%sliding%take_above(system%amplitude, departed)
          call self%shares%take_above(system%amplitude, self%departure%by_shares(system))
       else if (system%amplitude > self%low(1)) then
-         call take(self, system%amplitude, y)
+         if (self%n_low == 0) then
+            self%first = system%amplitude
+            self%first_y = y
+         end if
+         call self%take(system%amplitude, y)
       end if
    end subroutine note
 
-   subroutine take_above(self, system, y)
-      type(onset_finder), intent(inout) :: self
-      type(mode_system), intent(in) :: system
-      real(wp), intent(in) :: y(:)
-
-      self%high = system%amplitude
-      self%above = system%amplitude
-      self%y_above = y
-   end subroutine take_above
-
-   subroutine take(self, amplitude, y)
-      type(onset_finder), intent(inout) :: self
-      real(wp), intent(in) :: amplitude, y(:)
-
-      if (amplitude > self%low(1)) then
-         self%low = [amplitude, self%low(1)]
-         self%y(:, 2) = self%y(:, 1)
-         self%y(:, 1) = y
-      else if (amplitude > self%low(2)) then
-         self%low(2) = amplitude
-         self%y(:, 2) = y
-      end if
-      self%n_low = self%n_low + 1
-   end subroutine take
-
-   !> NaN where no row departs; 0 where a pair does at every amplitude, as one that closes without a
+   !> NaN where nothing departs up to the highest amplitude, or up to where the curve ended and no
+   !> bound leads further; 0 where a pair departs at every amplitude, as one that closes without a
    !> gap or an interference.
-   subroutine find(self, path, onset, error)
+   subroutine find(self, path, highest, complete, found, error)
       class(onset_finder), intent(inout) :: self
       type(mode_path), intent(inout) :: path
-      real(wp), intent(out) :: onset
+      real(wp), intent(in) :: highest
+      !> Whether the curve came to it.
+      logical, intent(in) :: complete
+      type(onset_type), intent(out) :: found
       type(error_type), allocatable, intent(out) :: error
-      logical :: found, known
-      real(wp) :: bound, y(size(self%y, 1))
+      logical :: bounded
 
-      onset = ieee_value(1.0_wp, ieee_quiet_nan)
+      found%amplitude = ieee_value(1.0_wp, ieee_quiet_nan)
+      found%bound = found%amplitude
       if (self%departure%at_every_amplitude()) then
-         onset = 0.0_wp
+         found%amplitude = 0.0_wp
+         found%known_by = onset_every
          return
       end if
-      if (.not. self%departed) return
-      onset = self%low(1)
-      if (self%n_low == 0) return
-      call find_bound(path%system, self%low(1), self%y(:, 1), self%departure%mu, bound, y, known)
-      if (.not. known) bound = huge(1.0_wp)
-      self%bounded = known
-      if (known) call look_at_bound(self, path, bound, y, found, error)
-      if (allocated(error)) return
-      if (known .and. found) then
-         onset = bound
-         if (coarse*self%low(1) >= bound) onset = min(bound, between(self, path%system))
+      if (size(self%departure%rest) == 0) return
+      if (self%n_low == 0) then
+         if (self%departed) found%known_by = onset_below
          return
       end if
-      call find_first_slip(self, path, onset, found, error)
-      if (allocated(error) .or. found) return
-      call close_in(self, path, error)
-      if (allocated(error)) return
-      onset = self%low(1)
-      if (self%above > self%low(1) .and. self%above <= coarse*coarse*self%low(1)) then
-         onset = between(self, path%system)
-      end if
-      onset = min(bound, onset)
+      if (complete .and. .not. self%departed) return
+      call find_bound(path%system, self%first, self%first_y, self%departure%mu, found%bound, &
+                      bounded)
+      if (bounded) call below_bound(self, path, highest, found, error)
+      if (.not. bounded) found%bound = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (allocated(error) .or. found%known_by /= onset_none) return
+      if (self%departed) call between_rows(self, path, found, error)
    end subroutine find
 
-   !> Just below the bound of the stuck motion: whether that sticks, or nothing says the contrary.
-   !> Solutions that slip below it, though the bound would allow them to stick, show that the
-   !> assembly does not lead to what it allows.
-   subroutine look_at_bound(self, path, bound, motion, sticks, error)
-      type(onset_finder), intent(inout) :: self
+   !> From the first solution up to the bound.
+   subroutine below_bound(self, path, highest, found, error)
+      class(onset_finder), intent(in) :: self
       type(mode_path), intent(inout) :: path
-      real(wp), intent(in) :: bound
-      !> The stuck motion there, to begin with.
-      real(wp), intent(in) :: motion(:)
-      logical, intent(out) :: sticks
+      real(wp), intent(in) :: highest
+      type(onset_type), intent(inout) :: found
       type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
-      real(wp) :: below, y(size(motion))
+      type(onset_search) :: search
+      logical :: reduced, stuck
 
-      below = bound/beside
-      ! What slips above the bound only leaves nothing to ask.
-      sticks = self%high >= bound .or. self%low(1) >= below
-      if (self%low(1) < below) then
-         y = motion
-         call solve_near(path, below, y, report, error)
-         if (allocated(error)) return
-         if (report%converged) then
-            ! What slips below it is another motion then.
-            if (self%departure%by_sliding(path%system, below, y) <= 0.0_wp) sticks = .true.
-            if (sticks) call judge(self, path%system, below, y)
-            sticks = sticks .and. self%low(1) >= below
+      search%departure = self%departure
+      allocate (search%y(size(self%y, 1), 2), source=0.0_wp)
+      call search%take(self%first, self%first_y)
+      associate (system => path%system)
+         ! As the curve began: with the phase of the stuck motion, whatever its rows have turned to.
+         call system%remember(self%first_y)
+         reduced = system%reduced
+         system%reduced = system%balance%reduced
+         call climb(search, path, min(found%bound/beside, highest), stuck, error)
+         if (.not. allocated(error)) then
+            if (.not. stuck) then
+               found%amplitude = search%low(1)
+               found%known_by = onset_stuck
+               if (search%above <= coarse*coarse*search%low(1)) then
+                  found%amplitude = min(found%bound, search%between(system))
+                  found%known_by = onset_solutions
+               end if
+            else if (highest > found%bound) then
+               search%high = beside*found%bound
+               found%amplitude = search%between(system)
+               ! About positions in a line it is known to all digits, but for what slides unseen.
+               if (found%amplitude > known*found%bound) found%amplitude = found%bound
+               found%known_by = onset_at_bound
+            end if
          end if
+         system%reduced = reduced
+      end associate
+   end subroutine below_bound
+
+   !> From the solutions of the curve between which something departs.
+   subroutine between_rows(self, path, found, error)
+      class(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      type(onset_type), intent(inout) :: found
+      type(error_type), allocatable, intent(out) :: error
+      logical :: done
+
+      found%known_by = onset_solutions
+      call find_first_slip(self, path, found%amplitude, done, error)
+      if (allocated(error) .or. done) return
+      call close_in(self, path, error)
+      if (allocated(error)) return
+      found%amplitude = self%low(1)
+      if (self%above > self%low(1) .and. self%above <= coarse*coarse*self%low(1)) then
+         found%amplitude = self%between(path%system)
+      else
+         found%known_by = onset_stuck
       end if
-      if (.not. sticks) return
-      self%high = beside*bound
-      self%above = self%high
-   end subroutine look_at_bound
+   end subroutine between_rows
 
    !> About a position that does not move: the onset to all digits, unless the pair that slips there
    !> shakes down.
@@ -254,7 +255,7 @@ contains
       bracket%high = high
       do while (bracket%high > ratio*bracket%low)
          middle = bracket%next()
-         call bracket%narrow(middle, by_shares(self, system, middle, position(self, middle)))
+         call bracket%narrow(middle, by_shares(self, system, middle, self%position(middle)))
       end do
       low = bracket%low
       high = bracket%high
@@ -286,36 +287,6 @@ contains
       end do
    end subroutine close_in
 
-   !> Between two solutions that are near to each other: about positions in a straight line.
-   real(wp) function between(self, system) result(onset)
-      type(onset_finder), intent(inout) :: self
-      type(mode_system), intent(inout) :: system
-      type(onset_bracket) :: bracket
-      real(wp) :: middle, y(size(self%y, 1))
-
-      bracket = self%sliding
-      call bracket%forget_zero()
-      bracket%low = self%low(1)
-      bracket%high = min(self%high, coarse*self%low(1))
-      do while (bracket%high > fine*bracket%low)
-         middle = bracket%next()
-         y = position(self, middle)
-         call bracket%narrow(middle, self%departure%by_sliding(system, middle, y))
-      end do
-      onset = bracket%low
-   end function between
-
-   !> Unknowns of the stuck motion: positions in a straight line.
-   function position(self, amplitude) result(y)
-      type(onset_finder), intent(in) :: self
-      real(wp), intent(in) :: amplitude
-      real(wp) :: y(size(self%y, 1))
-
-      y = self%y(:, 1)
-      if (self%n_low < 2) return
-      y = y + (amplitude - self%low(1))/(self%low(1) - self%low(2))*(y - self%y(:, 2))
-   end function position
-
    !> Solve at an amplitude, and note on which side of the onset it is: from positions in a line,
    !> then in steps, then from above.
    subroutine look(self, path, amplitude, error)
@@ -325,62 +296,25 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
       real(wp) :: reached, y(size(self%y, 1))
+      logical :: converged
 
-      y = position(self, amplitude)
-      call solve_near(path, amplitude, y, report, error)
-      if (allocated(error)) return
-      if (.not. (report%converged .or. self%bounded) .and. amplitude > self%low(1)) then
+      y = self%position(amplitude)
+      call self%look_from(path, amplitude, y, converged, error)
+      if (allocated(error) .or. converged) return
+      if (amplitude > self%low(1)) then
          call path%restart(log(self%low(1)), self%y(:, 1))
          call path%reach(log(amplitude), y, report, reached, error)
          if (allocated(error)) return
-         if (.not. report%converged .and. exp(reached) > self%low(1)) then
-            call judge(self, path%system, exp(reached), y)
-            if (self%high < amplitude) return
+         if (report%converged .or. exp(reached) > self%low(1)) then
+            call self%judge(path%system, exp(reached), y)
+            if (report%converged .or. self%high < amplitude) return
          end if
       end if
-      if (.not. report%converged) then
-         y = self%y_above
-         call solve_near(path, amplitude, y, report, error)
-         if (allocated(error)) return
-      end if
-      if (report%converged) then
-         call judge(self, path%system, amplitude, y)
-      else if (amplitude > self%low(1)) then
-         self%high = amplitude
-      end if
+      y = self%y_above
+      call self%look_from(path, amplitude, y, converged, error)
+      if (allocated(error) .or. converged) return
+      if (amplitude > self%low(1)) self%high = amplitude
    end subroutine look
-
-   !> A solution that is far from its guess may be one of another curve.
-   subroutine solve_near(path, amplitude, y, report, error)
-      type(mode_path), intent(inout) :: path
-      real(wp), intent(in) :: amplitude
-      real(wp), intent(inout), contiguous :: y(:)
-      type(solver_report), intent(out) :: report
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: guess(size(y))
-
-      guess = y
-      call path%solve(log(amplitude), y, report, error)
-      if (allocated(error)) return
-      report%converged = report%converged .and. norm2(y - guess) <= path%leash*norm2(guess)
-   end subroutine solve_near
-
-   !> On which side a solution is.
-   subroutine judge(self, system, amplitude, y)
-      type(onset_finder), intent(inout) :: self
-      type(mode_system), intent(inout) :: system
-      real(wp), intent(in) :: amplitude, y(:)
-      real(wp) :: departed
-
-      departed = self%departure%by_sliding(system, amplitude, y)
-      if (departed <= 0.0_wp) then
-         call take(self, amplitude, y)
-      else if (amplitude > self%low(1)) then
-         self%high = amplitude
-         call take_above(self, system, y)
-         call self%sliding%take_above(amplitude, departed)
-      end if
-   end subroutine judge
 
    !> Largest change of a share in a motion.
    real(wp) function by_shares(self, system, amplitude, y)

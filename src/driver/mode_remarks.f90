@@ -1,14 +1,14 @@
 !> Remarks on a nonlinear mode: harmonics that meet another mode on the way.
 module fw_mode_remarks
    use fw_kinds, only: wp
-   use fw_mode_group, only: mode_table
+   use fw_mode_group, only: mode_table, onset_below, onset_none, onset_stuck, onset_type
    use fw_mode_start, only: mode_start
    use fw_remarks, only: remark_list
    use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: remark_internal, remark_jump, remark_no_onset
+   public :: remark_internal, remark_jump, remark_onset
 
    !> Frequencies this near, as a part of them, meet: the tongues of weak couplings are narrow, and
    !> their damping is of this order.
@@ -118,6 +118,33 @@ contains
                        "another curve; take a lower mode%start with mode%continuation = "// &
                        "'arclength' to follow it")
    end subroutine remark_jump
+
+   !> What the onset of slip or separation is not known by.
+   subroutine remark_onset(onset, ended, reached, end, remarks)
+      type(onset_type), intent(in) :: onset
+      !> Whether the curve ended short of its highest amplitude.
+      logical, intent(in) :: ended
+      real(wp), intent(in) :: reached, end
+      type(remark_list), intent(inout) :: remarks
+      character(:), allocatable :: limit
+
+      select case (onset%known_by)
+      case (onset_none)
+         if (ended) call remark_no_onset(reached, end, remarks)
+      case (onset_below)
+         call remarks%add('onset not reached', 'the first solution of the curve slips or '// &
+                          'parts: onset_amplitude is NaN, as the onset is below it; take a '// &
+                          'lower mode%start')
+      case (onset_stuck)
+         limit = ''
+         if (onset%bound > 0.0_wp) limit = '; above '//to_text(onset%bound)//' nothing sticks'
+         call remarks%add('onset from below', 'pairs stick up to onset_amplitude = '// &
+                          to_text(onset%amplitude)//', and no solution was found just above '// &
+                          'it: the mode may part there and turn back to lower amplitudes'//limit)
+      case default
+         ! It is known on both sides.
+      end select
+   end subroutine remark_onset
 
    !> That nothing is known of the onset: the curve ended with its pairs as they are at rest.
    subroutine remark_no_onset(reached, end, remarks)

@@ -16,21 +16,18 @@ module fw_onset_bound
 
 contains
 
-   !> The bound, and unknowns of the stuck motion there.
-   subroutine find_bound(system, amplitude, y, mu, bound, motion, done)
+   subroutine find_bound(system, amplitude, y, mu, bound, done)
       type(mode_system), intent(inout) :: system
       !> A solution that sticks.
       real(wp), intent(in) :: amplitude, y(:)
       !> Friction coefficients (n_pairs).
       real(wp), intent(in) :: mu(:)
-      real(wp), intent(out) :: bound, motion(:)
+      real(wp), intent(out) :: bound
       logical, intent(out) :: done
       type(shakedown_type) :: pairs
-      real(wp), allocatable :: moved(:, :), start(:), x(:)
-      real(wp) :: unit
+      real(wp), allocatable :: x(:)
 
       bound = huge(1.0_wp)
-      motion = y
       associate (problem => system%balance%problem)
          done = problem%forces%n_laws == 1 .and. problem%fourier%has_constant() .and. &
                 all(mu > 0.0_wp) .and. amplitude > 0.0_wp
@@ -38,11 +35,10 @@ contains
          call evaluate_motion(system, amplitude, y)
          done = all(system%balance%work(problem%forces%pairs)%state /= pair_open)
          pairs%mu = mu
-         if (done) call describe(system, pairs, x, unit, done)
-         if (done) call couple(problem, system%n_static, pairs, moved, done)
+         if (done) call describe(system, pairs, x, done)
+         if (done) call couple(problem, system%n_static, pairs, done)
       end associate
       if (.not. done) return
-      start = x
       ! Normal forces without offsets: those of the motion hold with its own.
       pairs%normal = pairs%normal - matmul(pairs%coupling, x(:pairs%n - 1))
       ! A smaller motion about the same position is inside of all limits.
@@ -50,19 +46,15 @@ contains
       call pairs%maximise(x, done)
       if (.not. done) return
       bound = x(pairs%n)*amplitude
-      associate (n => pairs%n - 1)
-         motion(:system%n_static) = y(:system%n_static) + unit/system%static_unit* &
-                                    matmul(moved, x(:n) - start(:n))
-      end associate
    end subroutine find_bound
 
    !> Forces of the motion, over their size, of which its amplitude is one.
-   subroutine describe(system, pairs, x, unit, done)
+   subroutine describe(system, pairs, x, done)
       type(mode_system), intent(in) :: system
       type(shakedown_type), intent(inout) :: pairs
       real(wp), allocatable, intent(out) :: x(:)
-      real(wp), intent(out) :: unit
       logical, intent(out) :: done
+      real(wp) :: unit
       real(wp), allocatable :: offset(:, :)
       logical, allocatable :: slides(:, :)
       integer :: i
@@ -91,19 +83,18 @@ contains
       x = [pack(offset, slides), 1.0_wp]
    end subroutine describe
 
-   !> What a constant tangential force of each offset does: to the normal forces, of which only
-   !> changes count from here on, and to the static unknowns.
-   subroutine couple(problem, m, pairs, moved, done)
+   !> What a constant tangential force of each offset does to the normal forces, of which only
+   !> changes count from here on.
+   subroutine couple(problem, m, pairs, done)
       type(balance_problem), intent(in) :: problem
       !> Coordinates.
       integer, intent(in) :: m
       type(shakedown_type), intent(inout) :: pairs
-      !> (m, offsets)
-      real(wp), allocatable, intent(out) :: moved(:, :)
       logical, intent(out) :: done
       complex(wp) :: block(m, m), free(m, m), mass(m, m), damping(m, m), row(m), &
                      observe(problem%structure%n_observed, m)
       logical :: held(m)
+      real(wp) :: moved(m)
       type(lu_type) :: lu
       integer, allocatable :: kept(:)
       logical :: singular
@@ -121,7 +112,7 @@ contains
       call lu%factor(singular)
       done = .not. singular
       if (singular) return
-      allocate (moved(m, pairs%n - 1), pairs%coupling(pairs%n_pairs, pairs%n - 1), source=0.0_wp)
+      allocate (pairs%coupling(pairs%n_pairs, pairs%n - 1), source=0.0_wp)
       associate (entry => problem%forces%entry(problem%forces%pairs))
          do i = 1, pairs%n_pairs
             do c = 1, 2
@@ -129,12 +120,12 @@ contains
                if (j == 0) cycle
                row = (0.0_wp, 0.0_wp)
                call problem%incidence%scatter_harmonic(entry%row(c, i), 1, (-1.0_wp, 0.0_wp), row)
-               moved(:, j) = solved(lu, kept, real(row, wp))
-               call press(problem, real(block, wp), moved(:, j), pairs%coupling(:, j))
+               moved = solved(lu, kept, real(row, wp))
+               call press(problem, real(block, wp), moved, pairs%coupling(:, j))
             end do
          end do
       end associate
-      done = all(abs(moved) < huge(1.0_wp))
+      done = all(abs(pairs%coupling) < huge(1.0_wp))
    end subroutine couple
 
    !> Normal directions of pairs: springs in the stiffness, rigid ones hold their coordinates.
@@ -147,7 +138,7 @@ contains
       associate (entry => problem%forces%entry(problem%forces%pairs))
          do i = 1, size(entry%row, 2)
             if (entry%row(3, i) == 0) cycle
-            if (entry%law%prediction%takes_balance) then
+            if (entry%law%prediction%takes(i)) then
                held(problem%incidence%coordinate_of(entry%row(3, i))) = .true.
             else
                call problem%incidence%add_block(entry%row(3, i), 1, &
@@ -181,7 +172,7 @@ contains
       associate (entry => problem%forces%entry(problem%forces%pairs))
          do i = 1, size(normal)
             if (entry%row(3, i) == 0) cycle
-            if (entry%law%prediction%takes_balance) then
+            if (entry%law%prediction%takes(i)) then
                normal(i) = dot_product(stiffness(problem%incidence%coordinate_of(entry%row(3, i)), &
                                                  :), u)
             else

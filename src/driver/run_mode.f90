@@ -1,7 +1,7 @@
 !> Analysis 'mode': a nonlinear mode over its amplitude, its limit cycles, and responses near its
 !> resonance that are put together from it.
 module fw_run_mode
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of, coefficients_of
@@ -11,11 +11,11 @@ module fw_run_mode
    use fw_mode_apart, only: begin_apart
    use fw_mode_branching, only: branch_watch
    use fw_mode_cycles, only: cycle_finder
-   use fw_mode_group, only: mode_row, mode_table
+   use fw_mode_group, only: mode_row, mode_table, onset_every
    use fw_mode_options, only: control_observed
    use fw_mode_onset, only: onset_finder
    use fw_mode_path, only: mode_path
-   use fw_mode_remarks, only: remark_internal, remark_jump, remark_no_onset
+   use fw_mode_remarks, only: remark_internal, remark_jump, remark_onset
    use fw_mode_start, only: mode_start, node
    use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
@@ -106,7 +106,8 @@ contains
       call follow(case, curve, observer, state, y, error)
       if (.not. allocated(error)) call curve%cycles%find(curve%path, curve%table, error)
       if (.not. allocated(error) .and. .not. curve%start%slides) then
-         call curve%onset%find(curve%path, curve%table%onset_amplitude, error)
+         call curve%onset%find(curve%path, case%mode%end, .not. state%is_incomplete, &
+                               curve%table%onset, error)
       end if
       if (allocated(error)) then
          if (error%status == status_stopped) then
@@ -120,9 +121,9 @@ contains
       call remark_internal(curve%start, curve%table, summary%remarks)
       call curve%watch%remark(summary%remarks)
       call remark_jump(curve%jumped_at, case%mode%start, summary%remarks)
-      if (state%is_incomplete .and. curve%begins .and. curve%start%problem%n_pairs > 0 .and. &
-          ieee_is_nan(curve%table%onset_amplitude)) then
-         call remark_no_onset(exp(curve%end_p), case%mode%end, summary%remarks)
+      if (curve%begins .and. curve%start%problem%n_pairs > 0) then
+         call remark_onset(curve%table%onset, state%is_incomplete, exp(curve%end_p), &
+                           case%mode%end, summary%remarks)
       end if
       call synthesize(case%mode%synthesis, curve%table)
       call writer%add(curve%table, error)
@@ -145,7 +146,12 @@ contains
       table%stuck_omega = start%omega
       table%stuck_damping_ratio = 0.5_wp*start%self_excitation/start%omega
       table%slides = start%slides
-      if (.not. start%slides) table%onset_amplitude = ieee_value(1.0_wp, ieee_quiet_nan)
+      table%onset%bound = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (start%slides) then
+         table%onset%known_by = onset_every
+      else
+         table%onset%amplitude = ieee_value(1.0_wp, ieee_quiet_nan)
+      end if
    end subroutine describe_start
 
    !> Up to the lowest amplitude from where the stuck mode is exact, then along the curve.

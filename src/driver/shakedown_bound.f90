@@ -8,31 +8,23 @@
 module fw_shakedown_bound
    use fw_kinds, only: pi, wp
    use fw_linalg, only: lu_type
+   use fw_shakedown_limits, only: pair_limits, shakedown_limits
    implicit none (type, external)
    private
 
    public :: shakedown_type
 
-   type :: shakedown_type
-      !> Pairs, and unknowns: offsets and the amplitude behind them.
-      integer :: n_pairs = 0, n = 0
-      !> Friction coefficients (n_pairs); places of the offsets of each pair among the unknowns, 0
-      !> where it has no such direction (2, n_pairs).
-      real(wp), allocatable :: mu(:)
-      integer, allocatable :: place(:, :)
-      !> Normal forces without vibration or offset (n_pairs), and what offsets add (n_pairs, n - 1).
-      real(wp), allocatable :: normal(:), coupling(:, :)
-      !> Of t1, t2 and the normal force, for a unit amplitude: A Re(cycle exp(i t)) (3, n_pairs).
-      complex(wp), allocatable :: cycle(:, :)
+   type, extends(shakedown_limits) :: shakedown_type
       !> Instants at which laws decide, 0: all the time.
       integer :: n_time = 0
    contains
       procedure :: maximise
    end type shakedown_type
 
-   !> Rows times squared unknowns of a step that take no time, and instants of a period.
-   real(wp), parameter :: light = 5.0e5_wp
-   integer, parameter :: fewest = 96, most = 1440
+   !> Instants of a period where laws decide all the time: 2e-6 of a force is left between two; few
+   !> of them serve while the limits are further than `seen`.
+   integer, parameter :: many = 1440, few = 96
+   real(wp), parameter :: seen = 3.0e-3_wp
 
 contains
 
@@ -44,106 +36,135 @@ contains
       logical, intent(out) :: done
       !> Part of the amplitude that the weight of the limits may take, growth of the weight of the
       !> amplitude, and steps for each.
-      real(wp), parameter :: small = 1.0e-7_wp, growth = 30.0_wp
-      integer, parameter :: most_steps = 25
-      real(wp) :: weight, rows
-      integer :: k, n_time
-      logical :: failed
+      real(wp), parameter :: small = 1.0e-7_wp, growth = 4.0_wp
+      integer, parameter :: most_steps = 100, most_stages = 100
+      !> An amplitude, over the likely one, that has no bound.
+      real(wp), parameter :: unbounded = 1.0e6_wp
+      complex(wp), allocatable :: wave(:)
+      real(wp) :: scale, weight, within
+      integer :: every, k, stage
+      logical :: failed, is_fine
 
-      n_time = instants(self)
-      rows = 2.0_wp*n_time*self%n_pairs
-      weight = 1.0_wp/x(self%n)
-      done = allowed(self, n_time, x)
-      do while (done)
+      is_fine = self%n_time > 0
+      every = merge(self%n_time, many, self%n_time > 0)
+      wave = waves(merge(self%n_time, few, self%n_time > 0))
+      ! Pairs that do not vibrate bear any amplitude.
+      done = allowed(self, wave, x) .and. any(abs(self%cycle) > 0.0_wp)
+      if (done) scale = likely(self, x)
+      if (done) weight = 1.0_wp/scale
+      do stage = 1, most_stages
+         if (.not. done) exit
          do k = 1, most_steps
-            call improve(self, n_time, weight, x, done, failed)
+            call improve(self, wave, weight, x, done, failed)
             if (done .or. failed) exit
          end do
          ! What bears any amplitude has no bound, and what ends on the way is none.
-         done = x(self%n) < 1.0e6_wp .and. .not. failed
+         done = done .and. x(self%n) < unbounded*scale
          if (.not. done) exit
-         if (rows < small*weight*x(self%n)) exit
-         weight = growth*weight
+         ! Part of the amplitude that the weight of the limits takes.
+         within = 2.0_wp*size(wave)*self%n_pairs/(weight*x(self%n))
+         if (within < small .and. is_fine) then
+            if (size(wave) == every .or. allowed(self, waves(every), x)) exit
+            ! Instants between those that were chosen decide.
+            call refine(waves(every))
+         else if (within < seen .and. .not. is_fine) then
+            call refine(near_limits(self, waves(every), x))
+         else
+            weight = growth*weight
+         end if
       end do
+      done = done .and. stage <= most_stages
+
+   contains
+
+      !> Other instants, from a little inside.
+      subroutine refine(other)
+         complex(wp), intent(in) :: other(:)
+
+         is_fine = .true.
+         wave = other
+         x(self%n) = (1.0_wp - 2.0_wp*seen)*x(self%n)
+         weight = 2.0_wp*size(wave)*self%n_pairs/(seen*x(self%n))
+      end subroutine refine
+
    end subroutine maximise
 
-   pure integer function instants(self) result(n_time)
+   !> Of all instants those that may decide: at which a pair is near to its limit, and some between.
+   pure function near_limits(self, wave, x) result(chosen)
       type(shakedown_type), intent(in) :: self
-
-      n_time = self%n_time
-      if (n_time > 0) return
-      n_time = min(most, max(fewest, int(light/(real(self%n_pairs, wp)*self%n**2))))
-   end function instants
-
-   !> Limits mu^2 N^2 - |T|^2 of a pair at an instant, N, and their slopes.
-   pure subroutine limits(self, i, wave, x, left, pressure, by_x, normal_by_x)
-      type(shakedown_type), intent(in) :: self
-      integer, intent(in) :: i
-      complex(wp), intent(in) :: wave
+      complex(wp), intent(in) :: wave(:)
       real(wp), intent(in) :: x(:)
-      real(wp), intent(out) :: left, pressure, by_x(:, :), normal_by_x(:)
-      real(wp) :: force
-      integer :: c, n
+      complex(wp), allocatable :: chosen(:)
+      !> Part of the squared limit that is left.
+      real(wp), parameter :: near = 0.3_wp
+      type(pair_limits) :: limits
+      logical :: takes(size(wave))
+      integer :: i
 
-      n = self%n
-      normal_by_x(:n - 1) = self%coupling(i, :)
-      normal_by_x(n) = real(self%cycle(3, i)*wave, wp)
-      pressure = self%normal(i) + dot_product(normal_by_x, x)
-      left = (self%mu(i)*pressure)**2
-      by_x = 0.0_wp
-      do c = 1, 2
-         if (self%place(c, i) == 0) cycle
-         by_x(self%place(c, i), c) = 1.0_wp
-         by_x(n, c) = real(self%cycle(c, i)*wave, wp)
-         force = dot_product(by_x(:, c), x)
-         left = left - force**2
+      takes = .false.
+      takes(::size(wave)/few) = .true.
+      do i = 1, self%n_pairs
+         call self%find(i, wave, x, limits)
+         if (all(self%place(:, i) == 0)) then
+            takes = takes .or. limits%left < near*maxval(limits%left)
+         else
+            takes = takes .or. limits%left < near*(self%mu(i)*limits%normal)**2
+         end if
       end do
-   end subroutine limits
+      chosen = pack(wave, takes)
+   end function near_limits
+
+   !> An amplitude of the order of the largest one: at which the first pair would come to its limit
+   !> if it was unloaded at rest.
+   pure real(wp) function likely(self, x) result(amplitude)
+      type(shakedown_type), intent(in) :: self
+      real(wp), intent(in) :: x(:)
+      real(wp) :: normal(self%n_pairs), used(self%n_pairs)
+
+      normal = self%normal + matmul(self%coupling, x(:self%n - 1))
+      used = norm2(abs(self%cycle(1:2, :)), dim=1)/self%mu + abs(self%cycle(3, :))
+      amplitude = 1.0_wp/maxval(used/normal)
+   end function likely
+
+   !> exp(i t) at the instants of a period.
+   pure function waves(n_time) result(wave)
+      integer, intent(in) :: n_time
+      complex(wp) :: wave(n_time)
+      real(wp) :: angle
+      integer :: k
+
+      do k = 1, n_time
+         angle = 2.0_wp*pi*real(k - 1, wp)/real(n_time, wp)
+         wave(k) = cmplx(cos(angle), sin(angle), wp)
+      end do
+   end function waves
 
    !> Whether every pair bears, below its limit.
-   pure logical function allowed(self, n_time, x)
+   pure logical function allowed(self, wave, x)
       type(shakedown_type), intent(in) :: self
-      integer, intent(in) :: n_time
+      complex(wp), intent(in) :: wave(:)
       real(wp), intent(in) :: x(:)
-      real(wp) :: left, pressure, by_x(size(x), 2), normal_by_x(size(x))
-      integer :: i, k
 
-      allowed = .false.
-      do i = 1, self%n_pairs
-         do k = 1, n_time
-            call limits(self, i, wave_at(k, n_time), x, left, pressure, by_x, normal_by_x)
-            if (.not. pressure > 0.0_wp) return
-            if (any(self%place(:, i) > 0) .and. .not. left > 0.0_wp) return
-         end do
-      end do
-      allowed = x(size(x)) > 0.0_wp
+      allowed = x(self%n) > 0.0_wp .and. self%height(wave, 0.0_wp, x) < huge(1.0_wp)
    end function allowed
 
-   pure complex(wp) function wave_at(k, n_time) result(wave)
-      integer, intent(in) :: k, n_time
-      real(wp) :: angle
-
-      angle = 2.0_wp*pi*real(k - 1, wp)/real(n_time, wp)
-      wave = cmplx(cos(angle), sin(angle), wp)
-   end function wave_at
-
    !> A step of Newton's method, shortened to stay inside; done where it changes nothing.
-   subroutine improve(self, n_time, weight, x, done, failed)
+   subroutine improve(self, wave, weight, x, done, failed)
       type(shakedown_type), intent(in) :: self
-      integer, intent(in) :: n_time
+      complex(wp), intent(in) :: wave(:)
       real(wp), intent(in) :: weight
       real(wp), intent(inout) :: x(:)
       logical, intent(out) :: done
       !> No step was found.
       logical, intent(out) :: failed
-      real(wp), parameter :: no_change = 1.0e-6_wp
-      real(wp) :: gradient(size(x)), step(size(x)), length, decrement
+      !> Far less than what the weight of all limits leaves open.
+      real(wp), parameter :: no_change = 1.0e-3_wp
+      real(wp) :: gradient(size(x)), step(size(x)), decrement
       type(lu_type) :: lu
-      logical :: singular
-      integer :: halving
+      logical :: singular, halted
 
       call lu%reserve(self%n)
-      call slopes(self, n_time, x, gradient, lu%matrix(:self%n, :self%n))
+      call self%slopes(wave, x, gradient, lu%matrix(:self%n, :self%n))
       gradient(self%n) = gradient(self%n) - weight
       call lu%factor(singular)
       done = .false.
@@ -153,62 +174,43 @@ contains
       call lu%solve(step)
       decrement = sqrt(max(0.0_wp, -dot_product(gradient, step)))
       done = decrement <= no_change
-      ! Within one over the decrement such functions are near to their parabola.
-      length = 1.0_wp
-      if (decrement > 0.25_wp) length = 1.0_wp/(1.0_wp + decrement)
-      do halving = 1, 60
-         if (allowed(self, n_time, x + length*step)) exit
-         length = 0.5_wp*length
-      end do
-      if (halving > 60) then
-         done = .true.
-         return
-      end if
-      x = x + length*step
+      call search(self, wave, weight, step, -decrement**2, x, halted)
+      ! Round-off leaves nothing to go.
+      done = done .or. halted
    end subroutine improve
 
-   !> First and second derivatives of minus the logarithms of all limits.
-   subroutine slopes(self, n_time, x, gradient, curvature)
+   !> Go along a step: as far as it is allowed and does what its slope promises, then further while
+   !> that still helps.
+   subroutine search(self, wave, weight, step, slope, x, halted)
       type(shakedown_type), intent(in) :: self
-      integer, intent(in) :: n_time
-      real(wp), intent(in) :: x(:)
-      real(wp), intent(out) :: gradient(:), curvature(:, :)
-      real(wp), dimension(size(x)) :: normal_by_x, slope
-      real(wp) :: left, pressure, by_x(size(x), 2)
-      integer :: c, i, k
+      complex(wp), intent(in) :: wave(:)
+      real(wp), intent(in) :: weight, step(:), slope
+      real(wp), intent(inout) :: x(:)
+      logical, intent(out) :: halted
+      !> Part of what the slope promises that a step has to bring.
+      real(wp), parameter :: share = 0.1_wp
+      integer, parameter :: most_halvings = 60, most_doublings = 20
+      real(wp) :: length, value, start, further
+      integer :: k
 
-      gradient = 0.0_wp
-      curvature = 0.0_wp
-      do i = 1, self%n_pairs
-         do k = 1, n_time
-            call limits(self, i, wave_at(k, n_time), x, left, pressure, by_x, normal_by_x)
-            if (all(self%place(:, i) == 0)) then
-               slope = normal_by_x/pressure
-               gradient = gradient - slope
-               call add_square(1.0_wp, slope, curvature)
-               cycle
-            end if
-            slope = 2.0_wp*self%mu(i)**2*pressure*normal_by_x
-            do c = 1, 2
-               slope = slope - 2.0_wp*dot_product(by_x(:, c), x)*by_x(:, c)
-               call add_square(2.0_wp/left, by_x(:, c), curvature)
-            end do
-            gradient = gradient - slope/left
-            call add_square(1.0_wp/left**2, slope, curvature)
-            call add_square(-2.0_wp*self%mu(i)**2/left, normal_by_x, curvature)
+      start = self%height(wave, weight, x)
+      length = 1.0_wp
+      do k = 1, most_halvings
+         value = self%height(wave, weight, x + length*step)
+         if (value <= start + share*length*slope) exit
+         length = 0.5_wp*length
+      end do
+      halted = k > most_halvings
+      if (halted) return
+      if (k == 1) then
+         do k = 1, most_doublings
+            further = self%height(wave, weight, x + 2.0_wp*length*step)
+            if (.not. further < value) exit
+            value = further
+            length = 2.0_wp*length
          end do
-      end do
-   end subroutine slopes
-
-   pure subroutine add_square(factor, vector, matrix)
-      real(wp), intent(in) :: factor, vector(:)
-      real(wp), intent(inout) :: matrix(:, :)
-      integer :: j
-
-      do j = 1, size(vector)
-         if (.not. abs(vector(j)) > 0.0_wp) cycle
-         matrix(:, j) = matrix(:, j) + factor*vector(j)*vector
-      end do
-   end subroutine add_square
+      end if
+      x = x + length*step
+   end subroutine search
 
 end module fw_shakedown_bound

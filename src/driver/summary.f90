@@ -408,8 +408,8 @@ contains
          call add_line(self%mode, 'mode '//to_text(table%number), trim(short(table%stuck_omega))// &
                        ' rad/s '//trim(merge('sliding', 'stuck  ', table%slides))//', '// &
                        trim(short(row(table%n)%omega))//' at the end')
-         if (table%onset_amplitude > 0.0_wp) then
-            call add_line(self%mode, 'slips from', what//' = '//trim(short(table%onset_amplitude)))
+         if (table%onset%amplitude > 0.0_wp) then
+            call add_line(self%mode, 'slips from', what//' = '//trim(short(table%onset%amplitude)))
          end if
          damping = [(0.5_wp*row(k)%self_excitation/row(k)%omega, k=1, table%n)]
          k = maxloc(damping, dim=1)

@@ -6,7 +6,23 @@ module fw_mode_group
    implicit none (type, external)
    private
 
-   public :: mode_table, mode_row
+   public :: mode_table, mode_row, onset_type
+   public :: onset_none, onset_at_bound, onset_solutions, onset_stuck, onset_below, onset_every
+
+   !> How an onset is known: none there is, or is known of; a stuck solution just below its bound;
+   !> a stuck solution and one just above that is not; the highest stuck solution, above which none
+   !> was found; the first solution is not stuck; what departs does at every amplitude.
+   integer, parameter :: onset_none = 1, onset_at_bound = 2, onset_solutions = 3, &
+                         onset_stuck = 4, onset_below = 5, onset_every = 6
+   character(*), parameter :: known_by_words(6) = [character(9) :: 'none', 'bound', 'solutions', &
+                                                   'stuck', 'below', 'every']
+
+   !> From which amplitude on a pair slips or separates (NaN: not known, or none), how that is
+   !> known, and the amplitude above which nothing sticks (NaN: not known).
+   type :: onset_type
+      real(wp) :: amplitude = 0.0_wp, bound = 0.0_wp
+      integer :: known_by = onset_none
+   end type onset_type
 
    !> What a point of the curve has beside those of a response.
    type :: mode_row
@@ -25,10 +41,10 @@ module fw_mode_group
    end type mode_row
 
    type, extends(result_group) :: mode_table
-      !> Number of the mode, its frequency [rad/s] and damping with stuck pairs, and the amplitude
-      !> from which on a pair slips or separates; NaN where none does.
+      !> Number of the mode, its frequency [rad/s] and damping with stuck pairs.
       integer :: number = 1
-      real(wp) :: stuck_omega = 0.0_wp, stuck_damping_ratio = 0.0_wp, onset_amplitude = 0.0_wp
+      real(wp) :: stuck_omega = 0.0_wp, stuck_damping_ratio = 0.0_wp
+      type(onset_type) :: onset
       !> Whether it is that with sliding pairs, as none with stuck pairs exists.
       logical :: slides = .false.
       integer :: n = 0
@@ -118,7 +134,9 @@ contains
       call to%note('/mode', 'number', table%number)
       call to%note('/mode', 'stuck_omega', table%stuck_omega)
       call to%note('/mode', 'stuck_damping_ratio', table%stuck_damping_ratio)
-      call to%note('/mode', 'onset_amplitude', table%onset_amplitude)
+      call to%note('/mode', 'onset_amplitude', table%onset%amplitude)
+      call to%note('/mode', 'onset_bound', table%onset%bound)
+      call to%note('/mode', 'onset_known_by', trim(known_by_words(table%onset%known_by)))
    end subroutine write_points
 
    !> The factor of the load with which a point is a resonance: its work balances the damping.
