@@ -194,9 +194,7 @@ contains
       if (found%fold .and. (found%p - self%ends(1))*(found%p - self%ends(2)) <= 0.0_wp) then
          call self%folds%add(described_fold(found, point))
       end if
-      point%tangent_omega = found%t_p
-      ! That of a motion half a period later is not the one of the curve.
-      if (found%x(size(found%x)) >= 0.0_wp) call point_along(self, case, found, point, error)
+      call point_along(self, case, found, point, error)
       call note_time(self, point)
    end subroutine add_point
 
@@ -223,7 +221,8 @@ contains
       self%clock = now
    end subroutine note_time
 
-   !> The direction of the branch at a point, by a difference along the tangent.
+   !> The direction of the branch at a point, by a difference along the tangent; of a motion that
+   !> is that of the curve half a period later, that of its place alone.
    subroutine point_along(self, case, found, point, error)
       class(control_branch), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -238,11 +237,16 @@ contains
 
       n = size(found%x) - 1
       step = longest
-      most = difference*found%p
-      ! A parameter may be 0.
-      if (case%over%is_wanted()) most = difference*maxval(abs(self%ends))
+      if (case%over%is_wanted()) then
+         point%tangent_parameter = found%t_p
+         ! It may be 0.
+         most = difference*maxval(abs(self%ends))
+      else
+         point%tangent_omega = found%t_p
+         most = difference*found%p
+      end if
+      if (found%x(n + 1) < 0.0_wp) return
       if (abs(found%t_p)*step > most) step = most/abs(found%t_p)
-      point%tangent_omega = found%t_p
       associate (control => self%strategy%control)
          do side = -1, 1, 2
             y = found%x + side*step*found%t
