@@ -256,13 +256,8 @@ contains
       call build_system(case, self%whole_problem, self%whole, error, keep_all=.true., &
                         forces=system%problem%forces)
       if (allocated(error)) return
-      self%whole%interrupt => system%interrupt
       call self%whole%follow(system, error)
       if (allocated(error)) return
-      self%whole%depth = system%depth
-      associate (pairs => system%problem%forces%pairs)
-         self%whole%work(pairs)%x_start = system%work(pairs)%x_start
-      end associate
       deallocate (whole_x)
       allocate (whole_x(self%whole%n))
       call carry_solution(system, x, self%whole, whole_x)
@@ -512,7 +507,7 @@ contains
       if (allocated(error)) return
       point%omega = self%system%frequency()
       point%place = found%p
-      point%load_scale = case%model%harmonic_scale*self%system%vibratory_factor()
+      point%load_scale = case%model%harmonic_scale*self%system%load_factor(static=.false.)
       point%converged = found%report%converged
       if (point%converged) point%converged = is_lasting(self%system) .and. .not. &
                                              lacks_friction(self%system, coefficients)

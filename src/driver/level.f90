@@ -154,9 +154,7 @@ contains
 
       call carry_solution(source%system, source%solver%known%x(:, 1), self%system, x)
       call self%solver%known%begin_with(source%solver%known%place(1), x)
-      associate (pairs => source%system%problem%forces%pairs)
-         self%system%work(pairs)%x_start = source%system%work(pairs)%x_start
-      end associate
+      call self%system%like(source%system)
    end subroutine take_over
 
 end module fw_level

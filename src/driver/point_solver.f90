@@ -148,7 +148,7 @@ contains
       if (.not. (report%converged .and. self%method%stands)) call system%residual(self%x, self%r)
       point%omega = request%omega
       point%place = request%place()
-      point%load_scale = case%model%harmonic_scale*system%vibratory_factor()
+      point%load_scale = case%model%harmonic_scale*system%load_factor(static=.false.)
       point%converged = report%converged
       point%residual = report%residual
       ! Also of a point that failed: it is written with its mark.

@@ -175,13 +175,7 @@ contains
       end if
       call self%whole%follow(system, error)
       if (allocated(error)) return
-      ! Memory and reference, too.
-      self%whole%depth = system%depth
-      associate (pairs => system%problem%forces%pairs)
-         self%whole%work(pairs)%x_start = system%work(pairs)%x_start
-      end associate
       self%whole%reference = system%reference
-      self%whole%interrupt => system%interrupt
       allocate (whole_x(self%whole%n))
       call carry_solution(system, x, self%whole, whole_x)
       call new_flow(self%whole, pseudo%flow, flow)
