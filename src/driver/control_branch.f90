@@ -5,7 +5,6 @@
 !> are left, and the steps follow the curve: they are short where the load passes its minimum and
 !> the phase turns.
 module fw_control_branch
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_bifurcation, only: bifurcation_list
    use fw_branch_fold, only: described_fold
    use fw_case, only: case_type
@@ -36,7 +35,6 @@ module fw_control_branch
       !> A branch was not followed to its end.
       logical, private :: is_short = .false.
       real(wp), private :: ends(2) = 0.0_wp
-      integer(int64), private :: clock = 0
       !> Where branches turn back.
       type(bifurcation_list) :: folds
    contains
@@ -104,7 +102,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_request) :: request
 
-      call system_clock(self%clock)
       self%k = self%k + 1
       request = request_at(self, case, observer, self%ends(1))
       call self%strategy%solve_in_time(case, request, point, error)
@@ -121,7 +118,6 @@ contains
       call begin_curve(self, case, error)
       if (allocated(error)) return
       call point_along(self, case, self%curve%here, point, error)
-      call note_time(self, point)
    end subroutine first_point
 
    !> The curve from the solution that the strategy holds.
@@ -179,7 +175,8 @@ contains
          call strategy%turn_to_positive(here%report, error)
          more = here%report%converged
          if (more .and. .not. allocated(error)) then
-            call strategy%describe_point(case, at, here%report, point, error)
+            call strategy%describe_point(case, at, here%report, served_by_arclength, point, &
+                                         error)
          end if
          strategy%control%load_unit = unit
       end associate
@@ -190,12 +187,11 @@ contains
                                    trim(at%describe())//': the structure vibrates by itself')
          return
       end if
-      point%served_by = served_by_arclength
       if (found%fold .and. (found%p - self%ends(1))*(found%p - self%ends(2)) <= 0.0_wp) then
          call self%folds%add(described_fold(found, point))
       end if
       call point_along(self, case, found, point, error)
-      call note_time(self, point)
+      call self%strategy%about%note_seconds(point)
    end subroutine add_point
 
    !> What is asked of the points of the branch at work.
@@ -209,17 +205,6 @@ contains
       request = new_request(case, place, observer)
       request%amplitude = self%amplitude(self%k)
    end function request_at
-
-   !> Seconds since the point before: those of a point hold what was solved to find it.
-   subroutine note_time(self, point)
-      class(control_branch), intent(inout) :: self
-      type(point_type), intent(inout) :: point
-      integer(int64) :: now, rate
-
-      call system_clock(now, rate)
-      point%seconds = real(now - self%clock, wp)/real(rate, wp)
-      self%clock = now
-   end subroutine note_time
 
    !> The direction of the branch at a point, by a difference along the tangent; of a motion that
    !> is that of the curve half a period later, that of its place alone.

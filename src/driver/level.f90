@@ -137,8 +137,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call self%solver%solve(case, self%system, request, point, error)
-      point%n_harmonics = self%harmonics%n_harmonics
-      point%n_time = self%system%problem%fourier%n_time
       self%is_solved = .false.
       if (allocated(error) .or. .not. point%converged) return
       self%is_solved = .true.

@@ -108,9 +108,9 @@ contains
       associate (system => self%level%system, solver => self%level%solver)
          call summary%describe_work(system, solver%method%newton%linear, case%solver%kind, &
                                     state%all_converged())
-         call solver%sensitivity%describe(derivatives)
+         call solver%about%sensitivity%describe(derivatives)
          call summary%describe_sensitivity(derivatives)
-         call solver%sensitivity%remark(case, system, summary%remarks)
+         call solver%about%sensitivity%remark(case, system, summary%remarks)
          call remark_undetermined(solver%method%undetermined_at, &
                                   solver%method%undetermined_again, summary%remarks)
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)

@@ -10,7 +10,7 @@ module fw_run
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_observer, only: observer_type
-   use fw_outcome, only: outcome_type
+   use fw_run_state, only: outcome_type, run_state
    use fw_problem, only: build_system, threads_for
    use fw_remarks, only: remark_input, remark_unused
    use fw_restart_file, only: read_restart, restart_type
@@ -18,7 +18,6 @@ module fw_run
    use fw_run_mode, only: check_mode_case, run_mode
    use fw_run_modes, only: run_modes
    use fw_run_resonance, only: run_resonance
-   use fw_run_state, only: run_state
    use fw_strategy, only: kept_strategy
    use fw_summary, only: summary_type, new_summary
    use fw_text, only: string_type, to_text

@@ -2,10 +2,10 @@
 !> resonance that are put together from it.
 module fw_run_mode
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_continuation, only: arclength_type, branch_point
+   use fw_describe, only: describer
    use fw_error, only: error_type, status_stopped
    use fw_kinds, only: wp
    use fw_mode_apart, only: begin_apart
@@ -21,12 +21,11 @@ module fw_run_mode
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_point, only: point_type, served_by_arclength, served_by_newton
-   use fw_recovery, only: recover_point
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
-   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_sinks, only: observer_sink, sink_list, summary_sink, writer_sink
    use fw_solver_options, only: continuation_arclength, continuation_natural
+   use fw_strategy, only: new_request
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -42,9 +41,8 @@ module fw_run_mode
       type(mode_table) :: table
       type(sink_list) :: sinks
       type(observer_sink) :: to_observer
-      integer(int64) :: clock = 0
       type(cycle_finder) :: cycles
-      type(sensitivity_solver) :: sensitivity
+      type(describer) :: about
       type(branch_watch) :: watch
       type(onset_finder) :: onset
       !> ln A of the last row, and the amplitude of a fold below the first one that was passed over.
@@ -128,9 +126,9 @@ contains
       call writer%add(curve%table, error)
       call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
                                  state%all_converged())
-      call curve%sensitivity%describe(derivatives)
+      call curve%about%sensitivity%describe(derivatives)
       call summary%describe_sensitivity(derivatives)
-      call curve%sensitivity%remark(case, curve%start%balance, summary%remarks)
+      call curve%about%sensitivity%remark(case, curve%start%balance, summary%remarks)
       if (curve%begins) then
          call summary%describe_mode(curve%table, case%model%observe_name(1)%text, &
                                     case%mode%control == control_observed, case%mode%end)
@@ -159,7 +157,7 @@ contains
       type(solver_report) :: report
       real(wp) :: reached
 
-      call system_clock(curve%clock)
+      call curve%about%start_clock()
       call begin(case, curve, y, report, error)
       if (allocated(error)) return
       if (report%converged) then
@@ -460,7 +458,6 @@ contains
       type(point_type) :: point
       type(mode_row) :: row
       real(wp), allocatable :: y(:), q(:), r(:)
-      integer(int64) :: now, rate
 
       y = unknowns
       associate (system => curve%start%system, balance => curve%start%balance)
@@ -468,14 +465,10 @@ contains
          ! Newton's method has left the system at this point, a branch has gone on.
          if (served_by /= served_by_newton) call system%residual(y, r)
          call system%to_balance(y, q, row%omega, row%self_excitation)
-         point%omega = row%omega
-         point%converged = report%converged
-         point%residual = report%residual
-         point%iterations = report%iterations
-         if (report%converged) point%served_by = served_by
-         call recover_point(balance, q, case%harmonics%n_harmonics, case%output%contact, point)
-         point%n_harmonics = case%harmonics%n_harmonics
-         point%n_time = balance%problem%fourier%n_time
+         call curve%about%describe(case, new_request(case, row%omega), &
+                                   case%harmonics%n_harmonics, balance, q, report, served_by, &
+                                   point, error)
+         if (allocated(error)) return
          row%amplitude = system%amplitude
          row%converged = report%converged
          row%modal_amplitude = system%modal_amplitude(y)*system%amplitude
@@ -489,12 +482,10 @@ contains
             call curve%watch%note(system, y)
          end if
          if (report%converged .and. case%sensitivity%is_wanted()) then
-            call curve%sensitivity%find_mode(case, system, y, point)
+            call curve%about%sensitivity%find_mode(case, system, y, point)
          end if
       end associate
-      call system_clock(now, rate)
-      point%seconds = real(now - curve%clock, wp)/real(rate, wp)
-      curve%clock = now
+      call curve%about%note_seconds(point)
       call curve%sinks%take(point, error)
       if (allocated(error)) return
       call state%note(point)

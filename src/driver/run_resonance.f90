@@ -1,25 +1,25 @@
 !> Analysis 'resonance': a resonance as a function of a parameter.
 module fw_run_resonance
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_continuation, only: arclength_type, branch_point
    use fw_error, only: error_type, status_stopped
    use fw_kinds, only: pi, wp
    use fw_model, only: model_type
+   use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_parameters, only: parameter_words
    use fw_point, only: point_type, served_by_arclength, served_by_newton
-   use fw_recovery, only: recover_point
    use fw_resonance_group, only: resonance_row, resonance_table
    use fw_resonance_options, only: condition_phase
-   use fw_resonance_remarks, only: remark_resonance
    use fw_resonance_search, only: outcome_found, outcome_words
    use fw_resonance_track, only: resonance_track
+   use fw_remarks, only: remark_list
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
    use fw_sinks, only: observer_sink, sink_list, summary_sink, writer_sink
    use fw_solver_options, only: continuation_arclength
+   use fw_strategy, only: new_request, point_request
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -33,10 +33,12 @@ module fw_run_resonance
       type(resonance_table) :: table
       type(sink_list) :: sinks
       type(observer_sink) :: to_observer
-      integer(int64) :: clock = 0
       !> Maxima that are corners.
       integer :: n_corners = 0
    end type resonance_run
+
+   !> By how much another point has to be larger: a phase resonance is not the largest itself.
+   real(wp), parameter :: larger = 1.0e-6_wp, larger_by_phase = 0.05_wp
 
 contains
 
@@ -66,7 +68,7 @@ contains
       call run%sinks%add(to_summary)
       call run%sinks%add(run%to_observer)
       call observer%on_start(case%title, run%to_observer%n_points)
-      call system_clock(run%clock)
+      call run%track%strategy%level%solver%about%start_clock()
       call follow(case, run, observer, summary, state, error)
       if (allocated(error)) then
          if (error%status == status_stopped) then
@@ -87,7 +89,7 @@ contains
                                     state%all_converged())
       end associate
       call summary%describe_resonance(run%table, case)
-      associate (solver => run%track%strategy%level%solver%sensitivity, &
+      associate (solver => run%track%strategy%level%solver%about%sensitivity, &
                  system => run%track%strategy%level%system)
          call solver%describe(derivatives)
          call summary%describe_sensitivity(derivatives)
@@ -123,9 +125,9 @@ contains
       else
          call along_values(case, run, observer, summary, state, error)
       end if
-      if (.not. allocated(error)) call remark_resonance(case, run%track, run%table, &
-                                                        run%n_corners, observer, &
-                                                        summary%remarks, error)
+      if (.not. allocated(error)) then
+         call remark_resonance(case, run, observer, summary%remarks, error)
+      end if
    end subroutine follow
 
    !> What ended the track, at once and beside the result.
@@ -270,27 +272,27 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
       type(resonance_row) :: row
+      type(solver_report) :: report
+      type(point_request) :: request
       real(wp), allocatable :: r(:)
-      integer(int64) :: now, rate
       integer :: n
 
-      associate (track => run%track, system => run%track%strategy%level%system)
+      associate (track => run%track, system => run%track%strategy%level%system, &
+                 about => run%track%strategy%level%solver%about)
          n = system%n
          if (track%x(n + 1) <= 0.0_wp) return
          call system%set_frequency(track%x(n + 1), error)
          if (allocated(error)) return
          allocate (r(n))
          call system%residual(track%x(:n), r)
-         point%omega = track%x(n + 1)
-         point%converged = converged
-         point%residual = norm2(r)/system%reference
-         point%iterations = track%iterations
+         report%converged = converged
+         report%residual = norm2(r)/system%reference
+         report%iterations = track%iterations
          track%iterations = 0
-         if (converged) point%served_by = served_by
-         call recover_point(system, track%x(:n), case%harmonics%n_harmonics, case%output%contact, &
-                            point)
-         point%n_harmonics = case%harmonics%n_harmonics
-         point%n_time = system%problem%fourier%n_time
+         request = new_request(case, track%x(n + 1))
+         call about%describe(case, request, case%harmonics%n_harmonics, system, track%x(:n), &
+                             report, served_by, point, error)
+         if (allocated(error)) return
          row%parameter = track%mover%value
          row%omega = point%omega
          row%converged = converged
@@ -299,15 +301,13 @@ contains
          row%phase = phase_of(track%mover%case%model, point)
          row%curvature = ieee_value(1.0_wp, ieee_quiet_nan)
          if (converged) row%curvature = track%curve%curvature()
-         if (converged .and. case%sensitivity%is_wanted()) then
+         if (converged .and. request%sensitivity) then
             call differentiate(track, point, error)
             if (allocated(error)) return
          end if
+         call about%note_seconds(point)
       end associate
       if (converged .and. run%track%outcome%is_corner) run%n_corners = run%n_corners + 1
-      call system_clock(now, rate)
-      point%seconds = real(now - run%clock, wp)/real(rate, wp)
-      run%clock = now
       call run%sinks%take(point, error)
       if (allocated(error)) return
       call state%note(point)
@@ -323,7 +323,7 @@ contains
       logical :: done
 
       associate (case => track%mover%case, level => track%strategy%level, &
-                 solver => track%strategy%level%solver%sensitivity, n => size(track%x) - 1)
+                 solver => track%strategy%level%solver%about%sensitivity, n => size(track%x) - 1)
          call solver%renew(case)
          call solver%find(case, level%system, track%x(:n), point, error)
          if (allocated(error)) return
@@ -369,5 +369,65 @@ contains
       end associate
       if (phase <= -pi) phase = phase + 2.0_wp*pi
    end function phase_of
+
+   !> What the resonance makes worth saying, after the last point.
+   subroutine remark_resonance(case, run, observer, remarks, error)
+      type(case_type), intent(in) :: case
+      type(resonance_run), intent(inout), target :: run
+      class(observer_type), intent(inout), target :: observer
+      type(remark_list), intent(inout) :: remarks
+      type(error_type), allocatable, intent(out) :: error
+
+      if (run%n_corners > 0) call remarks%add('corner at the resonance', 'at '// &
+         to_text(run%n_corners)//' of '//to_text(run%table%n)//' points the response has a '// &
+         'corner at its maximum (a pair changes its state there, or contact is decided at instants): '// &
+         'frequencies are good to a millionth, and have no derivative')
+      call remark_optimum(case, run%table, remarks)
+      call remark_other_peak(case, run%track, run%table, observer, remarks, error)
+   end subroutine remark_resonance
+
+   !> The smallest value where it is no end.
+   subroutine remark_optimum(case, table, remarks)
+      type(case_type), intent(in) :: case
+      type(resonance_table), intent(in) :: table
+      type(remark_list), intent(inout) :: remarks
+      integer :: k
+
+      if (table%n < 3) return
+      associate (row => table%row(:table%n))
+         k = minloc(row%value, dim=1)
+         if (k == 1 .or. k == table%n) return
+         call remarks%add('optimum', 'the resonance is smallest near '// &
+                          trim(parameter_words(case%resonance%parameter))//' = '// &
+                          to_text(row(k)%parameter)//' ('//to_text(row(k)%value)//' at '// &
+                          to_text(row(k)%omega)//' rad/s)')
+      end associate
+   end subroutine remark_optimum
+
+   !> A sweep at the last value shows whether the peak that was followed still is the largest.
+   subroutine remark_other_peak(case, track, table, observer, remarks, error)
+      type(case_type), intent(in) :: case
+      type(resonance_track), intent(inout), target :: track
+      type(resonance_table), intent(in) :: table
+      class(observer_type), intent(inout), target :: observer
+      type(remark_list), intent(inout) :: remarks
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: x(:)
+      real(wp) :: value, margin
+
+      call track%sweep(observer, x, value, error)
+      if (allocated(error) .or. .not. allocated(x)) return
+      margin = larger
+      if (case%resonance%condition == condition_phase) margin = larger_by_phase
+      associate (last => table%row(table%n))
+         if (value <= (1.0_wp + margin)*last%value) return
+         call remarks%add('another peak', 'at '// &
+                          trim(parameter_words(case%resonance%parameter))//' = '// &
+                          to_text(last%parameter)//' the sweep is larger at '// &
+                          to_text(x(size(x)))//' rad/s ('//to_text(value)//') than at the '// &
+                          'resonance that was followed ('//to_text(last%value)//' at '// &
+                          to_text(last%omega)//' rad/s): another peak has become the largest')
+      end associate
+   end subroutine remark_other_peak
 
 end module fw_run_resonance

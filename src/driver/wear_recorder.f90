@@ -2,16 +2,16 @@
 !> depths, what was worn, the friction energy that it took, and whether more harmonics would have
 !> worn the same pairs.
 module fw_wear_recorder
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
+   use fw_describe, only: describer
    use fw_error, only: error_type, status_stopped
    use fw_finer_wear, only: finer_wear
    use fw_kinds, only: wp
+   use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_patches, only: patch_volumes
-   use fw_point, only: point_type
+   use fw_point, only: point_type, served_by_none
    use fw_point_solver, only: point_solver
-   use fw_recovery, only: recover_histories, recover_point
    use fw_restart_rows, only: restart_row_set
    use fw_result, only: result_writer
    use fw_solution, only: is_lasting
@@ -39,9 +39,9 @@ module fw_wear_recorder
       type(finer_wear) :: finer
       !> Friction energy up to the last row (n_pairs) [force*length], and the depths there.
       real(wp), allocatable :: energy(:), depth(:)
-      !> Rows written so far, and the clock at the last of them.
+      !> Rows written so far, and what makes points of states.
       integer :: n_rows = 0
-      integer(int64) :: clock = 0_int64
+      type(describer) :: about
    contains
       procedure :: take
       procedure :: begin_slip
@@ -62,23 +62,29 @@ contains
       logical, intent(out) :: go_on
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
-      integer(int64) :: clock, rate
+      type(point_request) :: request
+      type(solver_report) :: report
       integer :: n
 
       go_on = .false.
       n = system%n_vibration()
-      point%omega = system%vibration%frequency()
+      request = new_request(self%case, system%vibration%frequency())
+      ! Energy is that of the forces, whether these are written or not.
+      request%contact = .true.
+      request%cycle = .false.
+      request%stability = .false.
+      report%iterations = iterations
+      report%residual = state%residual
+      ! A state of the march is judged as any point is.
+      report%converged = is_lasting(system%vibration) .and. &
+                         state%residual <= self%allowed_residual()
+      call self%about%describe(self%case, request, self%case%harmonics%n_harmonics, &
+                               system%vibration, state%x(:n), report, served_by_none, point, error)
+      if (allocated(error)) return
       point%cycles = state%cycles
       point%depth = state%x(n + 1:)
       point%wear_rate = state%rate
       point%wear_volume = patch_volumes(self%case%contact, point%depth)
-      point%iterations = iterations
-      point%residual = state%residual
-      ! A state of the march is judged as any point is.
-      point%converged = is_lasting(system%vibration)
-      point%converged = point%converged .and. state%residual <= self%allowed_residual()
-      call recover_point(system%vibration, state%x(:n), self%case%harmonics%n_harmonics, &
-                         .true., point)
       call add_energy(self, state, point%dissipation)
       point%wear_energy = self%energy
       if (.not. self%case%output%contact) then
@@ -87,13 +93,7 @@ contains
       ! The pairs that slip before anything is worn.
       if (self%n_rows == 0) call self%finer%look(self%case, march, system, state, &
                                                  state%rate > 0.0_wp)
-      if (self%case%output%histories) then
-         call recover_histories(system%vibration, size(system%vibration%balance, 1), state%x(:n), &
-                                self%case%harmonics%n_harmonics, point)
-      end if
-      call system_clock(clock, rate)
-      point%seconds = real(clock - self%clock, wp)/real(rate, wp)
-      self%clock = clock
+      call self%about%note_seconds(point)
       call self%restart_rows%append(self%writer%file, march, state%x(:n), point%converged, &
                                     self%finer%notes(), error)
       if (allocated(error)) return

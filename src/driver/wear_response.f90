@@ -145,7 +145,7 @@ contains
       recorder%observer => observer
       recorder%writer => writer
       recorder%summary => summary
-      call system_clock(recorder%clock)
+      call recorder%about%start_clock()
       patches%contact => case%contact
       patches%cycles_units = cycles_units(case)
       call writer%add(patches, error)
