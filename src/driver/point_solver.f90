@@ -201,8 +201,8 @@ contains
    end function goes_on
 
    !> Where the best guesses known fail: pseudo-time; then from the last point on the sweep by
-   !> halves, or to the first point by raising the load; Newton again, with LU where GMRES failed; and at
-   !> last from the solution without contact, which may lie on another branch.
+   !> halves, or to the first point by raising the load; Newton again, with LU where GMRES failed;
+   !> and at last from the solution without contact, which may lie on another branch.
    subroutine beyond_guesses(self, case, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case

@@ -380,8 +380,8 @@ contains
 
       if (run%n_corners > 0) call remarks%add('corner at the resonance', 'at '// &
          to_text(run%n_corners)//' of '//to_text(run%table%n)//' points the response has a '// &
-         'corner at its maximum (a pair changes its state there, or contact is decided at instants): '// &
-         'frequencies are good to a millionth, and have no derivative')
+         'corner at its maximum (a pair changes its state there, or contact is decided at '// &
+         'instants): frequencies are good to a millionth, and have no derivative')
       call remark_optimum(case, run%table, remarks)
       call remark_other_peak(case, run%track, run%table, observer, remarks, error)
    end subroutine remark_resonance

@@ -72,7 +72,6 @@ contains
       ! Energy is that of the forces, whether these are written or not.
       request%contact = .true.
       request%cycle = .false.
-      request%stability = .false.
       report%iterations = iterations
       report%residual = state%residual
       ! A state of the march is judged as any point is.
