@@ -125,18 +125,17 @@ contains
 
    !> The first point as in a natural sweep, then along the branch until a bound or max_points.
    subroutine next_on_branch(self, case, observer, point, more, error)
-      class(branch_source), intent(inout) :: self
+      class(branch_source), intent(inout), target :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
 
+      more = .not. (self%has_no_start .or. observer%is_stopping())
+      if (.not. more) return
       if (.not. self%has_begun) then
          call solve_first(self, case, observer, point, error)
-         more = .true.
-      else if (self%has_no_start) then
-         more = .false.
       else
          call self%branch%next(case, point, more, error)
       end if

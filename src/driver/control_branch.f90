@@ -32,8 +32,6 @@ module fw_control_branch
       integer, private :: k = 0
       !> The branch that is followed; none between two of them.
       type(arclength_type), allocatable, private :: curve
-      !> A branch was not followed to its end.
-      logical, private :: is_short = .false.
       real(wp), private :: ends(2) = 0.0_wp
       !> Where branches turn back.
       type(bifurcation_list) :: folds
@@ -70,7 +68,7 @@ contains
    !> Points of the branch of one amplitude after those of the other; `more` is false after the
    !> last of them.
    subroutine next(self, case, observer, point, more, error)
-      class(control_branch), intent(inout) :: self
+      class(control_branch), intent(inout), target :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
@@ -78,6 +76,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(branch_point) :: found
 
+      more = .not. observer%is_stopping()
+      if (.not. more) return
       do
          if (allocated(self%curve)) then
             call self%curve%next(self%strategy%control, found, more, error)
@@ -108,7 +108,7 @@ contains
       if (allocated(error)) return
       if (allocated(point%note)) call observer%on_message(point%note)
       if (.not. point%converged) then
-         self%is_short = .true.
+         self%falls_short = .true.
          call observer%on_message('the first point of amplitude '// &
                                   to_text(self%amplitude(self%k))//' did not converge: no '// &
                                   'branch to follow')
@@ -182,7 +182,7 @@ contains
       end associate
       if (allocated(error)) return
       if (.not. more) then
-         self%is_short = .true.
+         self%falls_short = .true.
          call self%curve%end_early('the load vanishes at '// &
                                    trim(at%describe())//': the structure vibrates by itself')
          return
@@ -260,7 +260,7 @@ contains
       end associate
       call observer%on_message('branch of amplitude '//to_text(self%amplitude(self%k))//': '// &
                                self%curve%ending)
-      self%is_short = self%is_short .or. .not. self%curve%complete
+      self%falls_short = self%falls_short .or. .not. self%curve%complete
       call self%strategy%method%newton%linear%add_work(self%curve%corrector%linear)
       deallocate (self%curve)
    end subroutine close_branch
@@ -269,7 +269,7 @@ contains
    pure logical function is_covered(self)
       class(control_branch), intent(in) :: self
 
-      is_covered = self%k == size(self%amplitude) .and. .not. (self%is_short .or. &
+      is_covered = self%k == size(self%amplitude) .and. .not. (self%falls_short .or. &
                                                                allocated(self%curve))
    end function is_covered
 

@@ -532,14 +532,11 @@ contains
       type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
-      character(:), allocatable :: derivatives
 
       message = ''
       call summary%describe_work(self%system, self%method%newton%linear, case%solver%kind, &
                                  state%all_converged())
-      call self%about%sensitivity%describe(derivatives)
-      call summary%describe_sensitivity(derivatives)
-      call self%about%sensitivity%remark(case, self%system, summary%remarks)
+      call self%about%sensitivity%report(case, self%system, summary)
       call self%remark(state%n_points, summary%remarks)
       call remark_undetermined(self%method%undetermined_at, self%method%undetermined_again, &
                                summary%remarks)

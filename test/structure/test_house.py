@@ -13,8 +13,8 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (85200, 1000),
-    "files of src": (392, 10),
+    "lines of src": (85140, 1000),
+    "files of src": (390, 10),
     "lines of the longest file": (773, 50),
     "modules used by one file, at most": (33, 2),
     "files that name forces%pairs": (41, 0),
