@@ -8,7 +8,7 @@ program fw_run_program
    use fw_help, only: write_help
    use fw_signals, only: catch_interrupts
    use fw_key_text, only: write_keys
-   use fw_outcome, only: outcome_type
+   use fw_run_state, only: outcome_type
    use fw_progress, only: progress_type, new_progress
    use fw_solver_options, only: unit_hertz
    use fw_read_case, only: case_input, read_input

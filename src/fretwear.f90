@@ -16,7 +16,7 @@ module fretwear
    use fw_session, only: session_type
    ! A case as data, from a namelist, and run with a result file.
    use fw_case, only: case_type
-   use fw_outcome, only: outcome_type
+   use fw_run_state, only: outcome_type
    use fw_read_case, only: read_case, read_case_text
    use fw_run, only: check_case, run_case
    ! Progress, messages and stops: extend the abstract type, or take the silent one.

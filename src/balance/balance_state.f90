@@ -99,13 +99,12 @@ module fw_balance_state
       procedure :: goes_along
       procedure :: set_frequency
       procedure :: set_load_factors
-      procedure :: vibratory_factor
-      procedure :: static_factor
-      procedure :: take_loads
+      procedure :: load_factor
       procedure :: renew_structure
       procedure :: renew_workspaces
       procedure :: parameter
       procedure :: follow
+      procedure :: like
       procedure :: set_point
       procedure :: frequency
       procedure :: parameter_derivative
@@ -436,7 +435,7 @@ contains
       if (allocated(self%moved%mover)) parameter = self%moved%value
    end function parameter
 
-   !> Go to where another state of the case stands: its frequency, and its value of the parameter.
+   !> Be like another state of the case where it stands: its frequency, its value of the parameter.
    subroutine follow(self, other, error)
       class(balance_state), intent(inout) :: self
       class(balance_state), intent(in) :: other
@@ -451,8 +450,27 @@ contains
          if (allocated(error)) return
       end if
       if (self%problem%origin%borrows_laws) call take_stiffness(self, other%problem)
+      call self%like(other)
       call self%set_frequency(other%frequency(), error)
    end subroutine follow
+
+   !> What another state of the case has beside its place: depths, where the march starts, what may
+   !> end the work, and of the same problem the factors of its loads.
+   subroutine like(self, other)
+      class(balance_state), intent(inout) :: self
+      class(balance_state), intent(in) :: other
+      integer :: k
+
+      if (associated(self%problem, other%problem)) then
+         self%structure_state%load_factor = other%structure_state%load_factor
+         call self%structure_state%scale_loads()
+      end if
+      self%interrupt => other%interrupt
+      self%depth = other%depth
+      do k = 1, size(self%work)
+         if (allocated(other%work(k)%x_start)) self%work(k)%x_start = other%work(k)%x_start
+      end do
+   end subroutine like
 
    !> Rigid laws of another problem of the case: one and the same law has one eps.
    subroutine take_stiffness(self, other)
@@ -507,44 +525,21 @@ contains
       class(balance_state), intent(inout) :: self
       real(wp), intent(in) :: static, vibratory
 
-      associate (stand => self%structure_state)
-         stand%load_factor = merge(static, vibratory, self%problem%fourier%harmonic == 0)
-         call stand%scale_loads()
-      end associate
+      self%structure_state%load_factor = &
+         merge(static, vibratory, self%problem%fourier%harmonic == 0)
+      call self%structure_state%scale_loads()
    end subroutine set_load_factors
 
-   !> What `set_load_factors` gave the vibratory loads.
-   pure real(wp) function vibratory_factor(self) result(factor)
+   !> The factor of the vibratory loads, or of the static ones: 1 where none are in the balance.
+   pure real(wp) function load_factor(self, static) result(factor)
       class(balance_state), intent(in) :: self
-
-      factor = factor_of(self, .false.)
-   end function vibratory_factor
-
-   !> And the static ones; 1 where none are in the balance.
-   pure real(wp) function static_factor(self) result(factor)
-      class(balance_state), intent(in) :: self
-
-      factor = factor_of(self, .true.)
-   end function static_factor
-
-   pure real(wp) function factor_of(self, static) result(factor)
-      type(balance_state), intent(in) :: self
       logical, intent(in) :: static
       integer :: h
 
       factor = 1.0_wp
       h = findloc((self%problem%fourier%harmonic == 0) .eqv. static, .true., dim=1)
       if (h > 0) factor = self%structure_state%load_factor(h)
-   end function factor_of
-
-   !> The factors of the loads of another state of the problem.
-   subroutine take_loads(self, other)
-      class(balance_state), intent(inout) :: self
-      class(balance_state), intent(in) :: other
-
-      self%structure_state%load_factor = other%structure_state%load_factor
-      call self%structure_state%scale_loads()
-   end subroutine take_loads
+   end function load_factor
 
    !> Whether the derivatives of all laws are alike in all harmonics: functions of displacements.
    pure logical function all_are_static(problem)

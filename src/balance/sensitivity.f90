@@ -108,7 +108,6 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: r(size(x))
-      integer :: k
 
       if (associated(self%state) .and. .not. associated(self%problem, problem)) call self%clear()
       if (.not. associated(self%state)) then
@@ -118,14 +117,9 @@ contains
          self%state%reduced = .false.
          call self%slopes%start(self%state)
       end if
-      self%state%interrupt => system%interrupt
-      call self%state%take_loads(system)
+      call self%state%like(system)
       call self%state%set_frequency(system%frequency(), error)
       if (allocated(error)) return
-      self%state%depth = system%depth
-      do k = 1, size(self%state%work)
-         self%state%work(k)%x_start = system%work(k)%x_start
-      end do
       call self%state%residual(x, r)
    end subroutine stand
 

@@ -62,6 +62,8 @@ module fw_rules
       rule_type("solver%jacobian = 'difference'", "case%analysis = 'wear'", "use 'analytic'"), &
       rule_type("solver%jacobian = 'difference'", "sweep%continuation = 'arclength'", &
                 "use 'analytic'"), &
+      rule_type('sweep%stability = .true.', "case%analysis = 'time'", &
+                'what an integration comes to is stable by itself; leave it out'), &
       rule_type("contact%memory = 'carried'", "sweep%continuation = 'arclength'", &
                 "a branch turns back on itself; use 'assembly'"), &
       rule_type('sweep%refine = .true.', "case%analysis other than 'frf'", 'leave it out'), &

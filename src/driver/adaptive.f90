@@ -12,6 +12,7 @@ module fw_adaptive
    use fw_reduction, only: held_basis
    use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
@@ -101,10 +102,18 @@ contains
       type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
+      character(10) :: text
 
       call describe_levels(size(self%level), self%level, case%solver%kind, &
                            state%all_converged(), summary)
-      call summary%describe_harmonics(self%n_short, case%harmonics%adaptive_tolerance)
+      call summary%line('harmonics', to_text(summary%harmonics(1))//' to '// &
+                        to_text(summary%harmonics(2)))
+      if (self%n_short > 0) then
+         write (text, '(es8.1)') case%harmonics%adaptive_tolerance
+         call summary%line('', 'too few at '//to_text(self%n_short)//' points, which leave out '// &
+                           'more than '//trim(adjustl(text))//' of the force: raise '// &
+                           'harmonics%n_harmonics')
+      end if
       message = ''
    end subroutine describe
 

@@ -1,6 +1,5 @@
 !> A frequency response along its branch, through folds: continuation = 'arclength'.
 module fw_branch
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_bifurcation, only: bifurcation_list
@@ -11,6 +10,7 @@ module fw_branch
    use fw_continuation, only: arclength_type, branch_point
    use fw_crossing_search, only: probe_type, search_crossings
    use fw_cycle_recovery, only: recover_cycle
+   use fw_describe, only: describer
    use fw_error, only: error_type
    use fw_formulation, only: formulation_type
    use fw_balance_problem, only: balance_problem
@@ -21,14 +21,12 @@ module fw_branch
    use fw_point, only: point_type, served_by_arclength
    use fw_level, only: level_type
    use fw_problem, only: build_system
-   use fw_recovery, only: carry_solution, observed_coefficients, recover_histories, recover_point
+   use fw_recovery, only: carry_solution, observed_coefficients, recover_point
    use fw_slip_gap, only: lacks_friction
    use fw_solution, only: is_lasting
    use fw_stability_crossing, only: movement_between, multiplier_track, signature_of
-   use fw_sensitivity_solver, only: sensitivity_solver
-   use fw_stability_solver, only: stability_solver
    use fw_stability_verdict, only: verdict_undecided
-   use fw_strategy, only: new_request, note_time_limit
+   use fw_strategy, only: new_request, note_time_limit, point_request
    use fw_remarks, only: is_undamped
    use fw_response_view, only: response_view
    use fw_sweep, only: path_ends, point_source
@@ -57,12 +55,10 @@ module fw_branch
       !> What the curve is followed in.
       type(formulation_type) :: formulation
       class(parameter_system), pointer :: solved => null()
-      type(stability_solver) :: stability
       !> That of the level whose points come first.
-      type(sensitivity_solver), pointer :: sensitivity => null()
+      type(describer), pointer :: about => null()
       !> What a condensed structure is measured by.
       type(response_view), pointer :: view => null()
-      integer(int64) :: clock = 0
       real(wp), allocatable :: r(:)
       type(branch_peaks) :: peaks
       !> Frequencies where it begins and ends, or values of the parameter that it goes along.
@@ -129,18 +125,17 @@ contains
 
    !> The first point as in a natural sweep, then along the branch until a bound or max_points.
    subroutine next_on_branch(self, case, observer, point, more, error)
-      class(branch_source), intent(inout) :: self
+      class(branch_source), intent(inout), target :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
 
+      more = .not. (self%has_no_start .or. observer%is_stopping())
+      if (.not. more) return
       if (.not. self%has_begun) then
          call solve_first(self, case, observer, point, error)
-         more = .true.
-      else if (self%has_no_start) then
-         more = .false.
       else
          call self%branch%next(case, point, more, error)
       end if
@@ -166,7 +161,7 @@ contains
       self%has_no_start = .not. point%converged
       if (point%converged) then
          self%level%system%interrupt => observer
-         self%branch%sensitivity => self%level%solver%sensitivity
+         self%branch%about => self%level%solver%about
          call self%branch%begin(case, self%level%system, self%level%solver%x, error)
          if (.not. allocated(error)) call self%branch%point_along(case, self%branch%curve%here, &
                                                                   point, error)
@@ -211,7 +206,6 @@ contains
       real(wp), allocatable :: unknowns(:), whole_x(:)
 
       self%system => system
-      call system_clock(self%clock)
       call build_whole(self, case, system, x, whole_x, error)
       if (allocated(error)) return
       allocate (self%r(self%system%n))
@@ -256,13 +250,8 @@ contains
       call build_system(case, self%whole_problem, self%whole, error, keep_all=.true., &
                         forces=system%problem%forces)
       if (allocated(error)) return
-      self%whole%interrupt => system%interrupt
       call self%whole%follow(system, error)
       if (allocated(error)) return
-      self%whole%depth = system%depth
-      associate (pairs => system%problem%forces%pairs)
-         self%whole%work(pairs)%x_start = system%work(pairs)%x_start
-      end associate
       deallocate (whole_x)
       allocate (whole_x(self%whole%n))
       call carry_solution(system, x, self%whole, whole_x)
@@ -308,16 +297,13 @@ contains
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
       type(branch_point) :: found
-      integer(int64) :: clock, rate
 
       call self%curve%next(self%solved, found, more, error)
       if (allocated(error) .or. .not. more) return
       call describe(self, case, found, case%sweep%stability, point, error)
       if (.not. allocated(error)) call self%note(case, found, point, error)
       if (allocated(error)) return
-      call system_clock(clock, rate)
-      point%seconds = real(clock - self%clock, wp)/real(rate, wp)
-      self%clock = clock
+      call self%about%note_seconds(point)
    end subroutine next
 
    !> A point has been reached: what lies between it and the last.
@@ -507,33 +493,24 @@ contains
       logical, intent(in) :: with_stability
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
+      type(point_request) :: request
+      type(solver_report) :: report
       real(wp), allocatable :: coefficients(:)
 
       ! A fold is located by steps of its own: the system may stand at another frequency.
       call stand_at(self, found, coefficients, error)
       if (allocated(error)) return
-      point%omega = self%system%frequency()
-      point%place = found%p
-      point%load_scale = case%model%harmonic_scale*self%system%vibratory_factor()
-      point%converged = found%report%converged
-      if (point%converged) point%converged = is_lasting(self%system) .and. .not. &
-                                             lacks_friction(self%system, coefficients)
-      if (point%converged) point%served_by = served_by_arclength
-      point%iterations = found%report%iterations
-      point%residual = found%report%residual
+      request = new_request(case, found%p)
+      request%stability = with_stability
+      report = found%report
+      if (report%converged) report%converged = is_lasting(self%system) .and. .not. &
+                                               lacks_friction(self%system, coefficients)
       point%fold = found%fold
-      call recover_point(self%system, coefficients, case%harmonics%n_harmonics, &
-                         case%output%contact, point)
-      if (case%output%histories) then
-         call recover_histories(self%system, size(self%system%balance, 1), coefficients, &
-                                case%harmonics%n_harmonics, point)
-      end if
+      call self%about%describe(case, request, case%harmonics%n_harmonics, self%system, &
+                               coefficients, report, served_by_arclength, point, error)
       if (point%converged .and. is_within(self, found%p)) call note_height(self, found, point)
-      if (point%converged .and. with_stability) then
-         call self%stability%find(case, self%system, coefficients, point, error)
-      end if
-      if (point%converged .and. case%sensitivity%is_wanted() .and. .not. allocated(error)) then
-         call self%sensitivity%find(case, self%system, coefficients, point, error)
+      if (point%converged .and. request%sensitivity .and. .not. allocated(error)) then
+         call self%about%sensitivity%find(case, self%system, coefficients, point, error)
       end if
       if (.not. allocated(error)) call self%point_along(case, found, point, error)
    end subroutine describe

@@ -5,7 +5,6 @@
 !> are left, and the steps follow the curve: they are short where the load passes its minimum and
 !> the phase turns.
 module fw_control_branch
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_bifurcation, only: bifurcation_list
    use fw_branch_fold, only: described_fold
    use fw_case, only: case_type
@@ -33,10 +32,7 @@ module fw_control_branch
       integer, private :: k = 0
       !> The branch that is followed; none between two of them.
       type(arclength_type), allocatable, private :: curve
-      !> A branch was not followed to its end.
-      logical, private :: is_short = .false.
       real(wp), private :: ends(2) = 0.0_wp
-      integer(int64), private :: clock = 0
       !> Where branches turn back.
       type(bifurcation_list) :: folds
    contains
@@ -72,7 +68,7 @@ contains
    !> Points of the branch of one amplitude after those of the other; `more` is false after the
    !> last of them.
    subroutine next(self, case, observer, point, more, error)
-      class(control_branch), intent(inout) :: self
+      class(control_branch), intent(inout), target :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
@@ -80,6 +76,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(branch_point) :: found
 
+      more = .not. observer%is_stopping()
+      if (.not. more) return
       do
          if (allocated(self%curve)) then
             call self%curve%next(self%strategy%control, found, more, error)
@@ -104,14 +102,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_request) :: request
 
-      call system_clock(self%clock)
       self%k = self%k + 1
       request = request_at(self, case, observer, self%ends(1))
       call self%strategy%solve_in_time(case, request, point, error)
       if (allocated(error)) return
       if (allocated(point%note)) call observer%on_message(point%note)
       if (.not. point%converged) then
-         self%is_short = .true.
+         self%falls_short = .true.
          call observer%on_message('the first point of amplitude '// &
                                   to_text(self%amplitude(self%k))//' did not converge: no '// &
                                   'branch to follow')
@@ -121,7 +118,6 @@ contains
       call begin_curve(self, case, error)
       if (allocated(error)) return
       call point_along(self, case, self%curve%here, point, error)
-      call note_time(self, point)
    end subroutine first_point
 
    !> The curve from the solution that the strategy holds.
@@ -179,25 +175,23 @@ contains
          call strategy%turn_to_positive(here%report, error)
          more = here%report%converged
          if (more .and. .not. allocated(error)) then
-            call strategy%describe_point(case, at, here%report, point, error)
+            call strategy%describe_point(case, at, here%report, served_by_arclength, point, &
+                                         error)
          end if
          strategy%control%load_unit = unit
       end associate
       if (allocated(error)) return
       if (.not. more) then
-         self%is_short = .true.
+         self%falls_short = .true.
          call self%curve%end_early('the load vanishes at '// &
                                    trim(at%describe())//': the structure vibrates by itself')
          return
       end if
-      point%served_by = served_by_arclength
       if (found%fold .and. (found%p - self%ends(1))*(found%p - self%ends(2)) <= 0.0_wp) then
          call self%folds%add(described_fold(found, point))
       end if
-      point%tangent_omega = found%t_p
-      ! That of a motion half a period later is not the one of the curve.
-      if (found%x(size(found%x)) >= 0.0_wp) call point_along(self, case, found, point, error)
-      call note_time(self, point)
+      call point_along(self, case, found, point, error)
+      call self%strategy%about%note_seconds(point)
    end subroutine add_point
 
    !> What is asked of the points of the branch at work.
@@ -212,18 +206,8 @@ contains
       request%amplitude = self%amplitude(self%k)
    end function request_at
 
-   !> Seconds since the point before: those of a point hold what was solved to find it.
-   subroutine note_time(self, point)
-      class(control_branch), intent(inout) :: self
-      type(point_type), intent(inout) :: point
-      integer(int64) :: now, rate
-
-      call system_clock(now, rate)
-      point%seconds = real(now - self%clock, wp)/real(rate, wp)
-      self%clock = now
-   end subroutine note_time
-
-   !> The direction of the branch at a point, by a difference along the tangent.
+   !> The direction of the branch at a point, by a difference along the tangent; of a motion that
+   !> is that of the curve half a period later, that of its place alone.
    subroutine point_along(self, case, found, point, error)
       class(control_branch), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -238,11 +222,16 @@ contains
 
       n = size(found%x) - 1
       step = longest
-      most = difference*found%p
-      ! A parameter may be 0.
-      if (case%over%is_wanted()) most = difference*maxval(abs(self%ends))
+      if (case%over%is_wanted()) then
+         point%tangent_parameter = found%t_p
+         ! It may be 0.
+         most = difference*maxval(abs(self%ends))
+      else
+         point%tangent_omega = found%t_p
+         most = difference*found%p
+      end if
+      if (found%x(n + 1) < 0.0_wp) return
       if (abs(found%t_p)*step > most) step = most/abs(found%t_p)
-      point%tangent_omega = found%t_p
       associate (control => self%strategy%control)
          do side = -1, 1, 2
             y = found%x + side*step*found%t
@@ -271,7 +260,7 @@ contains
       end associate
       call observer%on_message('branch of amplitude '//to_text(self%amplitude(self%k))//': '// &
                                self%curve%ending)
-      self%is_short = self%is_short .or. .not. self%curve%complete
+      self%falls_short = self%falls_short .or. .not. self%curve%complete
       call self%strategy%method%newton%linear%add_work(self%curve%corrector%linear)
       deallocate (self%curve)
    end subroutine close_branch
@@ -280,7 +269,7 @@ contains
    pure logical function is_covered(self)
       class(control_branch), intent(in) :: self
 
-      is_covered = self%k == size(self%amplitude) .and. .not. (self%is_short .or. &
+      is_covered = self%k == size(self%amplitude) .and. .not. (self%falls_short .or. &
                                                                allocated(self%curve))
    end function is_covered
 

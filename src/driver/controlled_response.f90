@@ -4,12 +4,12 @@
 !> fail along a path: from the last solution by halves of the way, or from a small amplitude up.
 module fw_controlled_response
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_case, only: case_type
    use fw_control_options, only: of_first_harmonic
    use fw_control_system, only: control_system, new_control_system
+   use fw_describe, only: describer
    use fw_error, only: error_type
    use fw_guess, only: free_guess, stuck_guess
    use fw_interrupt, only: stop_run
@@ -20,11 +20,8 @@ module fw_controlled_response
       served_by_other_guess, served_by_raised_load, served_by_smaller_steps
    use fw_problem, only: build_system
    use fw_remarks, only: remark_list, remark_undetermined
-   use fw_recovery, only: recover_histories, recover_point
    use fw_run_state, only: run_state
-   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution, only: solution_method
-   use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request, point_strategy
    use fw_summary, only: summary_type
    use fw_text, only: to_text
@@ -50,8 +47,7 @@ module fw_controlled_response
       type(balance_state) :: system
       type(control_system) :: control
       type(solution_method) :: method
-      type(stability_solver) :: stability
-      type(sensitivity_solver) :: sensitivity
+      type(describer) :: about
       !> load%harmonic_scale of the case.
       real(wp) :: base = 1.0_wp
       !> Whether loads change their sign half a period later.
@@ -203,9 +199,8 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      integer(int64) :: clock, clock_end, rate
 
-      call system_clock(clock, rate)
+      call self%about%start_clock()
       if (allocated(self%note)) deallocate (self%note)
       self%system%interrupt => request%interrupt
       self%control%interrupt => request%interrupt
@@ -220,53 +215,38 @@ contains
          call look_for_others(self, request, error)
          if (allocated(error)) return
       end if
-      call self%describe_point(case, request, report, point, error)
+      report%iterations = self%iterations
+      call self%describe_point(case, request, report, self%served_by, point, error)
       if (allocated(error)) return
-      point%iterations = self%iterations
-      if (report%converged) point%served_by = self%served_by
       if (.not. report%converged) call explain(self, case, request, point%note)
       if (.not. (report%converged .or. allocated(point%note))) then
          self%n_unexplained = self%n_unexplained + 1
       end if
-      call system_clock(clock_end)
-      point%seconds = real(clock_end - clock, wp)/real(rate, wp)
+      call self%about%note_seconds(point)
    end subroutine solve
 
    !> What is known of the solution in y, at the frequency and the amplitude where it was found.
-   subroutine describe_point(self, case, request, report, point, error)
+   subroutine describe_point(self, case, request, report, served_by, point, error)
       class(controlled_response), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(point_request), intent(in) :: request
       type(solver_report), intent(in) :: report
+      integer, intent(in) :: served_by
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
       integer :: n
 
       n = self%system%n
       call self%control%residual(self%y, self%r)
-      point%omega = request%omega
-      point%place = request%place()
+      call self%about%describe(case, request, case%harmonics%n_harmonics, self%system, &
+                               self%y(:n), report, served_by, point, error)
+      if (allocated(error)) return
       ! Where none was found the last trial is no load, and may be negative.
       point%load_scale = ieee_value(1.0_wp, ieee_quiet_nan)
       if (report%converged) point%load_scale = self%y(n + 1)
       point%control = request%amplitude
-      point%converged = report%converged
-      point%residual = report%residual
-      point%iterations = report%iterations
-      call recover_point(self%system, self%y(:n), case%harmonics%n_harmonics, request%contact, &
-                         point)
-      point%n_harmonics = case%harmonics%n_harmonics
-      point%n_time = self%problem%fourier%n_time
-      if (request%histories) then
-         call recover_histories(self%system, size(self%system%balance, 1), self%y(:n), &
-                                case%harmonics%n_harmonics, point)
-      end if
-      if (report%converged .and. request%stability) then
-         call self%stability%find(case, self%system, self%y(:n), point, error)
-         if (allocated(error)) return
-      end if
       if (report%converged .and. request%sensitivity) then
-         call self%sensitivity%find_controlled(case, self%control, self%y, point)
+         call self%about%sensitivity%find_controlled(case, self%control, self%y, point)
       end if
    end subroutine describe_point
 
@@ -553,14 +533,11 @@ contains
       type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
-      character(:), allocatable :: derivatives
 
       message = ''
       call summary%describe_work(self%system, self%method%newton%linear, case%solver%kind, &
                                  state%all_converged())
-      call self%sensitivity%describe(derivatives)
-      call summary%describe_sensitivity(derivatives)
-      call self%sensitivity%remark(case, self%system, summary%remarks)
+      call self%about%sensitivity%report(case, self%system, summary)
       call self%remark(state%n_points, summary%remarks)
       call remark_undetermined(self%method%undetermined, summary%remarks)
       if (state%was_stopped .or. state%all_converged()) return

@@ -89,9 +89,6 @@ contains
       if (self%n_total <= self%n_kept) return
       call self%finer%follow(system, error)
       if (allocated(error)) return
-      associate (pairs => system%problem%forces%pairs)
-         self%finer%work(pairs)%x_start = system%work(pairs)%x_start
-      end associate
       self%coarse = x
       call self%linear%prepare(system, done)
       if (.not. done) return
@@ -135,7 +132,6 @@ contains
       call build_system(case, self%problem, self%finer, error, of_level=finer, &
                         forces=system%problem%forces, held=held)
       if (allocated(error)) return
-      self%finer%depth = system%depth
       self%linear%kind = case%solver%linear
       allocate (self%x(self%finer%n), self%r(self%finer%n))
    end subroutine build

@@ -136,8 +136,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call self%solver%solve(case, self%system, request, point, error)
-      point%n_harmonics = self%harmonics%n_harmonics
-      point%n_time = self%system%problem%fourier%n_time
       self%is_solved = .false.
       if (allocated(error) .or. .not. point%converged) return
       self%is_solved = .true.
@@ -153,9 +151,7 @@ contains
 
       call carry_solution(source%system, source%solver%known%x(:, 1), self%system, x)
       call self%solver%known%begin_with(source%solver%known%place(1), x)
-      associate (pairs => source%system%problem%forces%pairs)
-         self%system%work(pairs)%x_start = source%system%work(pairs)%x_start
-      end associate
+      call self%system%like(source%system)
    end subroutine take_over
 
 end module fw_level

@@ -1,6 +1,7 @@
-!> Limit cycles of a nonlinear mode: amplitudes at which its self-excitation vanishes, so that the
-!> motion keeps itself alive.
+!> What follows from the curve of a nonlinear mode: responses near its resonance, and limit cycles,
+!> amplitudes at which its self-excitation vanishes, so that the motion keeps itself alive.
 module fw_mode_cycles
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_mode_group, only: mode_row, mode_table
@@ -9,7 +10,7 @@ module fw_mode_cycles
    implicit none (type, external)
    private
 
-   public :: cycle_finder
+   public :: cycle_finder, synthesize
 
    type :: cycle_finder
       !> Ends of intervals of ln A in which the self-excitation vanishes, with their unknowns
@@ -104,5 +105,34 @@ contains
       call table%add_cycle(exp(middle), path%system%frequency_unit*trial(n - 1), &
                            (ends_y(n, 2) - ends_y(n, 1))*(ends(2) - ends(1)) > 0.0_wp)
    end subroutine find_cycle
+
+   !> Responses of one mode: P^2 = a^2 ((omega^2 - W^2)^2 + (2 zeta omega W)^2), which for each
+   !> amplitude a has two frequencies W, or none.
+   subroutine synthesize(scales, table)
+      !> Factors of the load; not allocated where nothing is asked for.
+      real(wp), allocatable, intent(in) :: scales(:)
+      type(mode_table), intent(inout) :: table
+      real(wp) :: centre, half, force, zeta
+      integer :: j, k
+
+      if (.not. allocated(scales) .or. table%n == 0) return
+      table%scale = scales
+      allocate (table%response_omega(2, table%n, size(table%scale)), &
+                source=ieee_value(1.0_wp, ieee_quiet_nan))
+      do j = 1, size(table%scale)
+         do k = 1, table%n
+            associate (row => table%row(k))
+               zeta = 0.5_wp*row%self_excitation/row%omega
+               force = table%scale(j)*row%force/row%modal_amplitude
+               half = force**2 - 4.0_wp*zeta**2*row%omega**4*(1.0_wp - zeta**2)
+               if (half < 0.0_wp) cycle
+               half = sqrt(half)
+               centre = row%omega**2*(1.0_wp - 2.0_wp*zeta**2)
+               if (centre - half > 0.0_wp) table%response_omega(1, k, j) = sqrt(centre - half)
+               if (centre + half > 0.0_wp) table%response_omega(2, k, j) = sqrt(centre + half)
+            end associate
+         end do
+      end do
+   end subroutine synthesize
 
 end module fw_mode_cycles

@@ -102,9 +102,9 @@ contains
 
       associate (factor => self%values_at(value)/self%built)
          if (self%number == harmonic_scale) then
-            call state%set_load_factors(state%static_factor(), factor(1))
+            call state%set_load_factors(state%load_factor(static=.true.), factor(1))
          else if (self%number == static_scale) then
-            call state%set_load_factors(factor(1), state%vibratory_factor())
+            call state%set_load_factors(factor(1), state%load_factor(static=.false.))
          else if (is_of_matrices(self%number)) then
             call move_structure(self%case, self%holds_eps, state, error)
          else

@@ -12,6 +12,7 @@ module fw_one_level
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
@@ -62,7 +63,7 @@ contains
 
       ! Of the point before.
       if (allocated(self%note)) deallocate (self%note)
-      call self%level%solve(case, request, point, error)
+      call self%level%solver%solve(case, self%level%system, request, point, error)
       if (allocated(error)) return
       if (.not. point%converged .and. goes_on(self, case, request)) then
          call start_elsewhere(case, self%level, self%below, request, &
@@ -102,20 +103,21 @@ contains
       type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
-      character(:), allocatable :: derivatives
 
       message = ''
       associate (system => self%level%system, solver => self%level%solver)
          call summary%describe_work(system, solver%method%newton%linear, case%solver%kind, &
                                     state%all_converged())
-         call solver%sensitivity%describe(derivatives)
-         call summary%describe_sensitivity(derivatives)
-         call solver%sensitivity%remark(case, system, summary%remarks)
+         call solver%about%sensitivity%report(case, system, summary)
          call remark_undetermined(solver%method%undetermined, summary%remarks)
-         if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
-         if (self%n_elsewhere > 0) call summary%note_elsewhere(self%n_elsewhere, self%way)
+         if (solver%n_by_flow > 0) call summary%line('fallback', 'pseudo-time served '// &
+                                                     to_text(solver%n_by_flow)//' points')
+         if (self%n_elsewhere > 0) call summary%line('other balances', 'served '// &
+                                                     to_text(self%n_elsewhere)//' points, '// &
+                                                     self%way)
          if (state%was_stopped .or. state%all_converged()) return
-         if (case%model%cyclic%is_cyclic .and. case%solver%fallback) call summary%leave_fallback()
+         if (case%model%cyclic%is_cyclic .and. case%solver%fallback) call summary%line( &
+            'left out', 'pseudo-time, which cyclic structures do not have')
          ! What cannot help in this case is left out.
          message = 'try a finer sweep, the other direction'
          if (is_undamped(case)) message = 'nothing but contact damps the structure: a '// &

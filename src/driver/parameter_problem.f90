@@ -82,10 +82,10 @@ contains
 
       allocate (new)
       call new_balance_state(problem, new)
-      new%interrupt => state%interrupt
       new%reduced = state%reduced
       new%load_share = state%load_share
-      call new%take_loads(state)
+      call new%like(state)
+      new%depth = problem%depth
       state = new
    end subroutine renew_state
 

@@ -1,12 +1,11 @@
 !> One solution point: warm start, other guesses, pseudo-time, intermediate frequencies or loads;
 !> then what is reported, and which of these served.
 module fw_point_solver
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_case, only: case_type
    use fw_interrupt, only: stop_run
    use fw_contact_data, only: memory_carried
-   use fw_cycle_recovery, only: recover_cycle
+   use fw_describe, only: describer
    use fw_error, only: error_type
    use fw_guess, only: free_guess, stuck_guess
    use fw_harmonics_options, only: harmonics_options
@@ -15,12 +14,8 @@ module fw_point_solver
    use fw_point, only: point_type, served_by_free_guess, served_by_kinsol, served_by_newton, &
       served_by_none, served_by_other_guess, served_by_powell, served_by_pseudo_time, &
       served_by_raised_load, served_by_smaller_steps
-   use fw_recovery, only: recover_histories, recover_point
-   use fw_tail, only: recover_tail
-   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution, only: solution_method
    use fw_solution_history, only: solution_history
-   use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request
    use fw_solver_options, only: pseudo_time_options, solver_kinsol, solver_newton, solver_options, &
       solver_powell, solver_pseudo_time
@@ -58,8 +53,7 @@ module fw_point_solver
    type :: point_solver
       !> The solver of the case, and pseudo-time where it fails.
       type(solution_method) :: method
-      type(stability_solver) :: stability
-      type(sensitivity_solver) :: sensitivity
+      type(describer) :: about
       !> The present solution, and the last converged ones with their frequencies. (Of a sweep over
       !> another parameter, here and below its values.)
       real(wp), allocatable :: x(:), r(:)
@@ -76,6 +70,8 @@ module fw_point_solver
       !> Iterations of a point from which on no other way is begun, and whether that was so.
       integer :: work_limit = huge(1)
       logical :: out_of_work = .false.
+      !> Options of the case: a point may ask for others.
+      type(solver_options) :: options
       !> What gave the present solution.
       integer :: served_by = served_by_none
    contains
@@ -108,63 +104,35 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      type(solver_options) :: kept
-      integer(int64) :: clock, clock_end, rate
+      integer :: iterations
 
-      call system_clock(clock, rate)
-      self%omega_wanted = request%place()
-      self%best_residual = huge(1.0_wp)
-      self%work_limit = min(request%most_work, &
-                            most_work*max(case%solver%max_iterations, least_counted))
-      self%out_of_work = .false.
-      system%interrupt => request%interrupt
-      if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)
+      iterations = 0
+      call begin(self, case, system, request, error)
       if (allocated(error)) return
-      kept = self%method%newton%options
-      if (request%by_newton) self%method%kind = solver_newton
-      associate (options => self%method%newton%options)
-         options%tolerance = max(options%tolerance, request%tolerance)
-         if (request%most_iterations > 0) then
-            options%max_iterations = min(options%max_iterations, request%most_iterations)
-            options%fallback = .false.
+      if (self%method%kind == solver_pseudo_time) then
+         call by_flow(self, case, case%pseudo_time, system, request%place(), report, iterations, &
+                      error)
+      else
+         call from_guesses(self, system, request%place(), report, iterations, error)
+         if (request%fallback .and. .not. allocated(error)) then
+            call beyond_guesses(self, case, system, request%place(), report, iterations, error)
          end if
-      end associate
-      call reach(self, case, system, request, report, point%iterations, error)
-      self%method%newton%options = kept
+      end if
+      self%method%newton%options = self%options
       self%method%kind = case%solver%kind
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return
+      call settle(self, system, report)
+      report%iterations = iterations
       if (self%out_of_work .and. .not. report%converged) then
          point%note = 'work limit: the other ways to '//trim(request%describe())// &
-                      ' were left after '//to_text(point%iterations)//' iterations'
+                      ' were left after '//to_text(iterations)//' iterations'
       end if
-      self%point_failures = merge(0, self%point_failures + 1, report%converged)
-      if (report%converged) point%served_by = self%served_by
-      if (.not. report%converged .and. self%best_residual < huge(1.0_wp)) then
-         self%x = self%best
-         report%residual = self%best_residual
-      end if
-      ! Forces and states of this very point: the last trial may have been another.
-      if (.not. (report%converged .and. self%method%stands)) call system%residual(self%x, self%r)
-      point%omega = request%omega
-      point%place = request%place()
-      point%load_scale = case%model%harmonic_scale*system%vibratory_factor()
-      point%converged = report%converged
-      point%residual = report%residual
-      ! Also of a point that failed: it is written with its mark.
-      call recover_point(system, self%x, self%method%harmonics%n_harmonics, request%contact, point)
-      call recover_tail(system, case%model, case%contact, point%omega, case%output%tail, point)
-      if (request%histories) then
-         call recover_histories(system, size(system%balance, 1), self%x, &
-            self%method%harmonics%n_harmonics, point)
-      end if
-      if (request%cycle) call recover_cycle(system, size(system%balance, 1), self%x, point)
-      if (report%converged .and. request%stability) then
-         call self%stability%find(case, system, self%x, point, error)
-         if (allocated(error)) return
-      end if
+      call self%about%describe(case, request, self%method%harmonics%n_harmonics, system, self%x, &
+                               report, self%served_by, point, error)
+      if (allocated(error)) return
       if (report%converged .and. request%sensitivity) then
-         call self%sensitivity%find(case, system, self%x, point, error)
+         call self%about%sensitivity%find(case, system, self%x, point, error)
          if (allocated(error)) return
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then
@@ -173,9 +141,52 @@ contains
             contact%x_start = contact%x
          end associate
       end if
-      call system_clock(clock_end)
-      point%seconds = real(clock_end - clock, wp)/real(rate, wp)
+      call self%about%note_seconds(point)
    end subroutine solve
+
+   !> What is asked of the point and its solver.
+   subroutine begin(self, case, system, request, error)
+      class(point_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(inout), target :: system
+      type(point_request), intent(in) :: request
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%about%start_clock()
+      self%omega_wanted = request%place()
+      self%best_residual = huge(1.0_wp)
+      self%work_limit = min(request%most_work, &
+                            most_work*max(case%solver%max_iterations, least_counted))
+      self%out_of_work = .false.
+      system%interrupt => request%interrupt
+      if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)
+      if (allocated(error)) return
+      self%options = self%method%newton%options
+      if (request%by_newton) self%method%kind = solver_newton
+      self%method%newton%linear%lu_left_out = .false.
+      associate (options => self%method%newton%options)
+         options%tolerance = max(options%tolerance, request%tolerance)
+         if (request%most_iterations > 0) then
+            options%max_iterations = min(options%max_iterations, request%most_iterations)
+            options%fallback = .false.
+         end if
+      end associate
+   end subroutine begin
+
+   !> Stand at the solution, or at the best that was found; count what fails in a row.
+   subroutine settle(self, system, report)
+      class(point_solver), intent(inout) :: self
+      type(balance_state), intent(inout), target :: system
+      type(solver_report), intent(inout) :: report
+
+      self%point_failures = merge(0, self%point_failures + 1, report%converged)
+      if (.not. report%converged .and. self%best_residual < huge(1.0_wp)) then
+         self%x = self%best
+         report%residual = self%best_residual
+      end if
+      ! Forces and states of this very point: the last trial may have been another.
+      if (.not. (report%converged .and. self%method%stands)) call system%residual(self%x, self%r)
+   end subroutine settle
 
    !> Whether other ways to the point are worth beginning.
    logical function goes_on(self, report, iterations)
@@ -189,41 +200,32 @@ contains
       goes_on = .not. self%out_of_work
    end function goes_on
 
-   !> Newton from the best guesses known. Where all fail: pseudo-time; then from the last point on
-   !> the sweep by halves, or to the first point by raising the load; Newton again, with LU where
-   !> GMRES failed; and at last from the solution without contact, which may lie on another branch.
-   subroutine reach(self, case, system, request, report, iterations, error)
+   !> Where the best guesses known fail: pseudo-time; then from the last point on the sweep by
+   !> halves, or to the first point by raising the load; Newton again, with LU where GMRES failed;
+   !> and at last from the solution without contact, which may lie on another branch.
+   subroutine beyond_guesses(self, case, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(balance_state), intent(inout), target :: system
-      type(point_request), intent(in) :: request
-      type(solver_report), intent(out) :: report
+      real(wp), intent(in) :: omega
+      type(solver_report), intent(inout) :: report
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
 
-      if (self%method%kind == solver_pseudo_time) then
-         call by_flow(self, case, case%pseudo_time, system, request%place(), report, iterations, &
-                      error)
-         return
-      end if
-      self%method%newton%linear%lu_left_out = .false.
-      call from_guesses(self, system, request%place(), report, iterations, error)
-      if (allocated(error)) return
-      if (.not. request%fallback) return
       if (.not. goes_on(self, report, iterations)) return
       if (looks_again(self%point_failures + 1)) then
-         call by_other_ways(self, case, system, request%place(), report, iterations, error)
+         call by_other_ways(self, case, system, omega, report, iterations, error)
          if (allocated(error)) return
          if (.not. goes_on(self, report, iterations)) return
       end if
       if (self%method%newton%linear%lu_left_out) then
          self%method%newton%linear%lu_follows = .true.
-         call from_guesses(self, system, request%place(), report, iterations, error)
+         call from_guesses(self, system, omega, report, iterations, error)
          self%method%newton%linear%lu_follows = .false.
          if (allocated(error) .or. report%converged .or. report%interrupted) return
       end if
-      call from_free_guess(self, system, request%place(), report, iterations)
-   end subroutine reach
+      call from_free_guess(self, system, omega, report, iterations)
+   end subroutine beyond_guesses
 
    !> Ways that cost many solutions: pseudo-time, then smaller steps of the frequency or the load,
    !> of which a few come first where there are many unknowns.
@@ -279,7 +281,8 @@ contains
       type(solver_report) :: last_report
 
       call free_guess(system, self%x)
-      call attempt(self, system, last_report)
+      call self%method%solve(system, self%x, last_report)
+      call note_best(self, system, last_report)
       iterations = iterations + last_report%iterations
       report%interrupted = last_report%interrupted
       if (.not. last_report%converged) return
@@ -313,7 +316,7 @@ contains
          self%served_by = served_by_pseudo_time
          call self%known%remember(omega, self%x)
       else
-         call note_best(self, report)
+         call note_best(self, system, report)
       end if
    end subroutine by_flow
 
@@ -342,7 +345,8 @@ contains
          system%load_share = min(1.0_wp, share + step)
          call system%set_parameter(omega, error)
          if (allocated(error)) exit
-         call attempt(self, system, report)
+         call self%method%solve(system, self%x, report)
+         call note_best(self, system, report)
          iterations = iterations + report%iterations
          if (report%converged) then
             reached = self%x
@@ -366,7 +370,8 @@ contains
       end if
    end subroutine raise_load
 
-   !> Newton from the guesses at a frequency.
+   !> Newton from the guesses at a frequency: extrapolation along the sweep, the last solution, all
+   !> stuck.
    subroutine from_guesses(self, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(balance_state), intent(inout), target :: system
@@ -374,11 +379,30 @@ contains
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
+      integer :: guess, first
 
       call system%set_parameter(omega, error)
       if (allocated(error)) return
-      call try_guesses(self, system, omega, report, iterations)
-      if (report%converged) call self%known%remember(omega, self%x)
+      first = 3 - min(self%known%kept, 2)
+      do guess = first, 3
+         select case (guess)
+         case (1)
+            call self%known%predict(omega, self%x)
+         case (2)
+            self%x = self%known%x(:, 1)
+         case default
+            call stuck_guess(system, self%x)
+         end select
+         call self%method%solve(system, self%x, report)
+         call note_best(self, system, report)
+         iterations = iterations + report%iterations
+         if (report%converged .or. report%interrupted) exit
+         if (.not. self%method%newton%options%fallback) exit
+      end do
+      if (.not. report%converged) return
+      self%served_by = served_by_other_guess
+      if (guess == first) self%served_by = first_choice(self%method%kind)
+      call self%known%remember(omega, self%x)
    end subroutine from_guesses
 
    !> First half of the way from the last point, which may take halves of its own, then the rest.
@@ -425,37 +449,6 @@ contains
       if (halves_again) halves_again = goes_on(self, report, iterations)
    end function halves_again
 
-   !> Extrapolation along the sweep, the last solution, all stuck.
-   subroutine try_guesses(self, system, omega, report, iterations)
-      class(point_solver), intent(inout) :: self
-      type(balance_state), intent(inout), target :: system
-      real(wp), intent(in) :: omega
-      type(solver_report), intent(out) :: report
-      integer, intent(inout) :: iterations
-      integer :: guess, first
-
-      first = 3
-      if (self%known%kept > 0) first = 2
-      if (self%known%kept > 1) first = 1
-      do guess = first, 3
-         select case (guess)
-         case (1)
-            call self%known%predict(omega, self%x)
-         case (2)
-            self%x = self%known%x(:, 1)
-         case default
-            call stuck_guess(system, self%x)
-         end select
-         call attempt(self, system, report)
-         iterations = iterations + report%iterations
-         if (report%converged .or. report%interrupted) exit
-         if (.not. self%method%newton%options%fallback) exit
-      end do
-      if (.not. report%converged) return
-      self%served_by = served_by_other_guess
-      if (guess == first) self%served_by = first_choice(self%method%kind)
-   end subroutine try_guesses
-
    !> The solver that the case asks for.
    pure integer function first_choice(kind)
       integer, intent(in) :: kind
@@ -470,23 +463,15 @@ contains
       end select
    end function first_choice
 
-   !> One solution from the guess in x; the best that fails at the point itself is noted.
-   subroutine attempt(self, system, report)
+   !> Keep the unknowns of the smallest residual, where they failed at the point itself:
+   !> intermediate frequencies and loads are no answer to what was asked. NaN is never smaller.
+   subroutine note_best(self, system, report)
       class(point_solver), intent(inout) :: self
-      type(balance_state), intent(inout), target :: system
-      type(solver_report), intent(out) :: report
-
-      call self%method%solve(system, self%x, report)
-      if (report%converged .or. system%load_share < 1.0_wp) return
-      ! Intermediate frequencies and loads are no answer to what was asked.
-      if (abs(system%parameter() - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
-   end subroutine attempt
-
-   !> Keep the unknowns of the smallest residual; NaN is never smaller.
-   subroutine note_best(self, report)
-      class(point_solver), intent(inout) :: self
+      type(balance_state), intent(in) :: system
       type(solver_report), intent(in) :: report
 
+      if (report%converged .or. system%load_share < 1.0_wp) return
+      if (abs(system%parameter() - self%omega_wanted) > 0.0_wp) return
       if (.not. report%residual < self%best_residual) return
       self%best_residual = report%residual
       self%best = self%x

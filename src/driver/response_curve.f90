@@ -100,11 +100,10 @@ contains
 
       call new_balance_state(self%problem, self%state)
       call new_balance_state(self%problem, self%shifted)
-      call self%state%take_loads(system)
-      call self%shifted%take_loads(system)
+      call self%state%like(system)
+      call self%shifted%like(system)
       self%state%reduced = .false.
       self%shifted%reduced = .false.
-      self%state%interrupt => system%interrupt
       self%linear%kind = self%newton%options%linear
       if (self%linear%kind /= linear_lu .and. self%linear%kind /= linear_krylov) then
          self%linear%kind = merge(linear_lu, linear_krylov, self%state%n <= lu_up_to)

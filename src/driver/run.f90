@@ -2,29 +2,28 @@
 module fw_run
    use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
-   use fw_kinds, only: wp
+   use fw_analysis, only: analysis, run_type
+   use fw_case, only: analyses, analysis_mode, analysis_modes, analysis_resonance, analysis_wear, &
+      case_type
    use fw_combinations, only: check_combinations
-   use fw_case, only: analysis_mode, analysis_modes, analysis_resonance, analysis_wear, case_type
    use fw_error, only: error_type
-   use fw_frequency_response, only: run_frequency_response
-   use fw_balance_problem, only: balance_problem
-   use fw_balance_state, only: balance_state
+   use fw_frequency_response, only: response_analysis
+   use fw_kinds, only: wp
    use fw_observer, only: observer_type
-   use fw_outcome, only: outcome_type
-   use fw_problem, only: build_system, threads_for
-   use fw_remarks, only: remark_input, remark_unused
+   use fw_point, only: point_type
+   use fw_problem, only: threads_for
+   use fw_remarks, only: remark_input
    use fw_restart_file, only: read_restart, restart_type
-   use fw_result, only: result_writer
-   use fw_run_mode, only: check_mode_case, run_mode
-   use fw_run_modes, only: run_modes
-   use fw_run_resonance, only: run_resonance
-   use fw_run_state, only: run_state
+   use fw_run_mode, only: mode_analysis
+   use fw_run_modes, only: modes_analysis
+   use fw_run_resonance, only: resonance_analysis
+   use fw_run_state, only: outcome_type
    use fw_strategy, only: kept_strategy
-   use fw_summary, only: summary_type, new_summary
-   use fw_text, only: string_type, to_text
+   use fw_summary, only: new_summary
+   use fw_text, only: to_text
    use fw_text_list, only: append
    use fw_threads, only: thread_scope
-   use fw_wear_response, only: run_wear
+   use fw_wear_response, only: wear_analysis
    implicit none (type, external)
    private
 
@@ -32,33 +31,52 @@ module fw_run
 
 contains
 
+   !> How a case is computed.
+   subroutine new_analysis(case, work)
+      type(case_type), intent(in) :: case
+      class(analysis), allocatable, intent(out) :: work
+
+      select case (case%analysis)
+      case (analysis_modes); allocate (modes_analysis :: work)
+      case (analysis_mode); allocate (mode_analysis :: work)
+      case (analysis_resonance); allocate (resonance_analysis :: work)
+      case (analysis_wear); allocate (wear_analysis :: work)
+      case default; allocate (response_analysis :: work)
+      end select
+   end subroutine new_analysis
+
    !> Everything that would refuse a case before it is computed; nothing is written.
    subroutine check_case(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(balance_problem), target :: problem
-      type(balance_state) :: system
+      class(analysis), allocatable, target :: work
       type(thread_scope) :: threads
       type(restart_type) :: restart
+
+      call check_input(case, restart, error)
+      if (allocated(error)) return
+      call threads%enter(threads_for(case))
+      call new_analysis(case, work)
+      call work%check(case, error)
+      call threads%leave()
+   end subroutine check_case
+
+   !> What goes together, and the run to be continued.
+   subroutine check_input(case, restart, error)
+      type(case_type), intent(in) :: case
+      type(restart_type), intent(inout) :: restart
+      type(error_type), allocatable, intent(out) :: error
 
       call check_combinations(case, error)
       if (allocated(error)) return
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
-      if (allocated(error)) return
-      call threads%enter(threads_for(case))
-      if (case%analysis == analysis_mode) then
-         call check_mode_case(case, error)
-      else if (case%analysis /= analysis_modes) then
-         call build_system(case, problem, system, error)
-      end if
-      call threads%leave()
-   end subroutine check_case
+   end subroutine check_input
 
    !> Run a case and write its result file. Points that did not converge make the outcome
    !> status_not_converged, an observer that asks for it status_stopped; `error` is for what ends
    !> the run.
    subroutine run_case(case, observer, outcome, error, write_file, image, kept)
-      type(case_type), intent(in) :: case
+      type(case_type), intent(in), target :: case
       class(observer_type), intent(inout), target :: observer
       type(outcome_type), intent(out) :: outcome
       type(error_type), allocatable, intent(out) :: error
@@ -69,80 +87,115 @@ contains
       integer(c_int8_t), allocatable, intent(out), optional :: image(:)
       !> Of a piece of a sweep: what the one before left, and then what this one leaves.
       type(kept_strategy), intent(inout), target, optional :: kept
-      type(result_writer), target :: writer
-      type(summary_type), target :: summary
-      type(run_state) :: state
+      type(run_type), target :: run
+      class(analysis), allocatable, target :: work
       type(thread_scope) :: threads
+      type(point_type) :: point
+      integer(int64) :: clock
+      logical :: more
+
+      call system_clock(clock)
+      call check_input(case, run%restart, error)
+      if (.not. allocated(error)) call open_run(case, observer, run, error, write_file, &
+                                                in_memory=present(image))
+      if (allocated(error)) return
+      if (present(kept)) run%kept => kept
+      ! Behind the file, before the first product: results must not depend on the threads of the
+      ! host.
+      call threads%enter(threads_for(case))
+      if (analyses(case%analysis)%has_points) call remark_input(case, run%summary%remarks)
+      call new_analysis(case, work)
+      call work%start(case, run, error)
+      more = associated(run%source) .and. .not. allocated(error)
+      do while (more)
+         call run%source%next(case, observer, point, more, error)
+         if (allocated(error) .or. .not. more) exit
+         call run%take(point, error)
+         if (allocated(error)) exit
+      end do
+      if (associated(run%source)) call end_points(case, run, error)
+      if (.not. allocated(error)) call work%conclude(case, run, error)
+      call threads%leave()
+      call close_run(case, run, clock, outcome, error, image)
+   end subroutine run_case
+
+   !> The result file, an observer that may have been used before, and a summary that knows nothing.
+   subroutine open_run(case, observer, run, error, write_file, in_memory)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: write_file
+      logical, intent(in) :: in_memory
+
+      observer%stop_requested = .false.
+      observer%n_wanted = huge(1)
+      call observer%limit_run(case%max_seconds)
+      run%observer => observer
+      run%summary = new_summary(case)
+      if (in_memory) then
+         call run%writer%open(case, error, in_memory=.true.)
+      else if (is_wanted(write_file)) then
+         call run%writer%open(case, error)
+      end if
+   end subroutine open_run
+
+   !> After the last point, whatever ended them.
+   subroutine end_points(case, run, error)
+      type(case_type), intent(in) :: case
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(inout) :: error
+
+      call run%forgive_stop(error)
+      if (.not. allocated(error)) call run%source%finish(case, run%observer)
+      run%state%is_incomplete = run%state%is_incomplete .or. .not. run%source%is_covered()
+      call run%observer%on_end()
+   end subroutine end_points
+
+   !> The end of the file, and what is told.
+   subroutine close_run(case, run, start, outcome, error, image)
+      type(case_type), intent(in) :: case
+      type(run_type), intent(inout), target :: run
+      !> The clock when the run began.
+      integer(int64), intent(in) :: start
+      type(outcome_type), intent(inout) :: outcome
+      type(error_type), allocatable, intent(inout) :: error
+      integer(c_int8_t), allocatable, intent(inout), optional :: image(:)
       type(error_type), allocatable :: close_error
-      type(restart_type) :: restart
-      type(string_type), allocatable :: table(:)
-      integer(int64) :: clock, clock_end, rate
+      integer(int64) :: clock, rate
       real(wp) :: elapsed
       integer :: i
 
       call system_clock(clock, rate)
-      call check_combinations(case, error)
-      if (allocated(error)) return
-      if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
-      if (allocated(error)) return
-      ! Observers may be used again.
-      observer%stop_requested = .false.
-      observer%n_wanted = huge(1)
-      call observer%limit_run(case%max_seconds)
-      if (present(image)) then
-         call writer%open(case, error, in_memory=.true.)
-      else if (is_wanted(write_file)) then
-         call writer%open(case, error)
-      end if
-      if (allocated(error)) return
-      ! Behind the file, before the first product: results must not depend on the threads of the
-      ! host.
-      call threads%enter(threads_for(case))
-      summary = new_summary(case)
-      if (case%analysis /= analysis_modes) call remark_input(case, summary%remarks)
-      if (case%analysis == analysis_modes) then
-         call remark_unused(case, summary%remarks)
-         call run_modes(case, writer, table, error)
-      else if (case%analysis == analysis_mode) then
-         call run_mode(case, observer, writer, summary, state, error)
-      else if (case%analysis == analysis_resonance) then
-         call run_resonance(case, observer, writer, summary, state, error)
-      else if (case%analysis == analysis_wear) then
-         call run_wear(case, restart, observer, writer, summary, state, error)
-      else
-         call run_frequency_response(case, observer, writer, summary, state, error, kept)
-      end if
-      call threads%leave()
-      call system_clock(clock_end)
-      elapsed = real(clock_end - clock, wp)/real(rate, wp)
-      outcome%status = state%status()
-      outcome%out_of_time = observer%run_out
-      call summary%remark_instants()
-      if (.not. allocated(error)) call writer%add(summary%remarks, error)
-      if (allocated(error)) then
-         if (state%n_points == 0) then
-            ! A result without points is none.
-            call writer%discard()
-         else
-            ! What was computed until then stays readable, and says that it is not all.
-            call writer%close('failed: '//error%message, elapsed, close_error)
-            if (present(image)) call move_alloc(writer%image, image)
-         end if
+      elapsed = real(clock - start, wp)/real(rate, wp)
+      outcome%status = run%state%status()
+      outcome%out_of_time = run%observer%run_out
+      call run%summary%remark_instants()
+      if (.not. allocated(error)) call run%writer%add(run%summary%remarks, error)
+      if (allocated(error) .and. run%state%n_points == 0) then
+         ! A result without points is none.
+         call run%writer%discard()
+         return
+      else if (allocated(error)) then
+         ! What was computed until then stays readable, and says that it is not all.
+         call run%writer%close('failed: '//error%message, elapsed, close_error)
+         if (present(image)) call move_alloc(run%writer%image, image)
          return
       end if
-      if (observer%run_out) call observer%on_message('time limit: the run ended after case'// &
-         '%max_seconds = '//to_text(case%max_seconds)//' s')
-      call writer%close(trim(state%words()), elapsed, error, summary%skipped, summary%sampling)
-      if (present(image)) call move_alloc(writer%image, image)
-      if (allocated(table)) then
-         do i = 1, summary%remarks%count()
-            call append(table, 'remark            '//summary%remarks%text(i)%text)
-         end do
-         call move_alloc(table, outcome%summary)
-      else
-         outcome%summary = summary%lines(state, elapsed)
+      if (run%observer%run_out) call run%observer%on_message('time limit: the run ended after '// &
+         'case%max_seconds = '//to_text(case%max_seconds)//' s')
+      call run%writer%close(trim(run%state%words()), elapsed, error, run%summary%skipped, &
+                            run%summary%sampling)
+      if (present(image)) call move_alloc(run%writer%image, image)
+      if (.not. allocated(run%table)) then
+         outcome%summary = run%summary%lines(run%state, elapsed)
+         return
       end if
-   end subroutine run_case
+      do i = 1, run%summary%remarks%count()
+         call append(run%table, 'remark            '//run%summary%remarks%text(i)%text)
+      end do
+      call move_alloc(run%table, outcome%summary)
+   end subroutine close_run
 
    !> A flag that may be absent: then it is true.
    pure logical function is_wanted(flag)

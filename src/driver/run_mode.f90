@@ -2,141 +2,148 @@
 !> resonance that are put together from it.
 module fw_run_mode
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_analysis, only: analysis, run_type
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_continuation, only: arclength_type, branch_point
-   use fw_error, only: error_type, status_stopped
+   use fw_describe, only: describer
+   use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_mode_apart, only: begin_apart
    use fw_mode_branching, only: branch_watch
-   use fw_mode_cycles, only: cycle_finder
+   use fw_mode_cycles, only: cycle_finder, synthesize
    use fw_mode_group, only: mode_row, mode_table, onset_every
    use fw_mode_options, only: control_observed
    use fw_mode_onset, only: onset_finder
    use fw_mode_path, only: mode_path
    use fw_mode_remarks, only: remark_internal, remark_jump, remark_onset
    use fw_mode_start, only: mode_start, node
-   use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_point, only: point_type, served_by_arclength, served_by_newton
-   use fw_recovery, only: recover_point
-   use fw_result, only: result_writer
-   use fw_run_state, only: run_state
-   use fw_sensitivity_solver, only: sensitivity_solver
-   use fw_sinks, only: observer_sink, sink_list, summary_sink, writer_sink
    use fw_solver_options, only: continuation_arclength, continuation_natural
-   use fw_summary, only: summary_type
+   use fw_strategy, only: new_request
    use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: run_mode, check_mode_case
+   public :: mode_analysis
 
-   !> A curve at work.
-   type :: mode_curve
-      type(mode_start) :: start
+   type, extends(analysis) :: mode_analysis
+      private
+      type(run_type), pointer :: run => null()
+      type(mode_start) :: at_rest
       type(mode_path) :: path
       type(arclength_type) :: branch
       type(mode_table) :: table
-      type(sink_list) :: sinks
-      type(observer_sink) :: to_observer
-      integer(int64) :: clock = 0
       type(cycle_finder) :: cycles
-      type(sensitivity_solver) :: sensitivity
+      type(describer) :: about
       type(branch_watch) :: watch
       type(onset_finder) :: onset
       !> ln A of the last row, and the amplitude of a fold below the first one that was passed over.
       real(wp) :: end_p = 0.0_wp, jumped_at = 0.0_wp
       !> Whether there is one at all: of what did not converge nothing is told.
       logical :: begins = .true.
+      !> The present unknowns, and how they were found.
+      real(wp), allocatable :: y(:)
+      type(solver_report) :: report
       !> ln A of the first solution, below the lowest amplitude, and its unknowns.
       real(wp) :: first_p = 0.0_wp
       real(wp), allocatable :: first_y(:)
-   end type mode_curve
+   contains
+      procedure :: start
+      procedure :: check
+      procedure :: next
+      procedure :: conclude
+   end type mode_analysis
 
    !> Below this part of the stuck frequency nothing holds the motion any more.
    real(wp), parameter :: lost_frequency = 1.0e-3_wp
 
 contains
 
-   !> What would refuse the case before anything is computed.
-   subroutine check_mode_case(case, error)
+   !> The mode at rest.
+   subroutine check(self, case, error)
+      class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(mode_start), allocatable, target :: start
 
-      allocate (start)
-      call start%build(case, error)
-   end subroutine check_mode_case
+      call self%at_rest%build(case, error)
+   end subroutine check
 
-   !> Follow the mode from its lowest to its highest amplitude.
-   subroutine run_mode(case, observer, writer, summary, state, error)
+   subroutine start(self, case, run, error)
+      class(mode_analysis), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%check(case, error)
+      if (allocated(error)) return
+      self%run => run
+      call describe_start(self%at_rest, self%table)
+      call run%begin_points(case, self, merge(case%mode%n_points, 0, &
+                                              case%mode%continuation == continuation_natural))
+      self%at_rest%system%interrupt => run%observer
+      self%at_rest%balance%interrupt => run%observer
+      allocate (self%y(self%at_rest%system%n))
+      call self%path%start(self%at_rest%system, case%solver)
+      call self%about%start_clock()
+   end subroutine start
+
+   !> The first row, then along the curve; behind the last one limit cycles and the onset of slip
+   !> are looked for.
+   subroutine next(self, case, observer, point, more, error)
+      class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
-      type(result_writer), intent(inout), target :: writer
-      type(summary_type), intent(inout), target :: summary
-      type(run_state), intent(inout) :: state
+      type(point_type), intent(out) :: point
+      logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      type(mode_curve), allocatable, target :: curve
-      type(writer_sink), target :: to_file
-      type(summary_sink), target :: to_summary
-      real(wp), allocatable :: y(:)
-      character(:), allocatable :: derivatives
 
-      allocate (curve)
-      call curve%start%build(case, error)
-      if (allocated(error)) return
-      call describe_start(curve%start, curve%table)
-      to_file%writer => writer
-      to_summary%summary => summary
-      curve%to_observer%observer => observer
-      if (case%mode%continuation == continuation_natural) then
-         curve%to_observer%n_points = case%mode%n_points
+      more = self%begins
+      if (more .and. self%table%n == 0) then
+         call follow(self, case, observer, point, error)
+         if (allocated(error) .or. .not. self%begins) return
       end if
-      call curve%sinks%add(to_file)
-      call curve%sinks%add(to_summary)
-      call curve%sinks%add(curve%to_observer)
-      call observer%on_start(case%title, curve%to_observer%n_points)
-      curve%start%system%interrupt => observer
-      curve%start%balance%interrupt => observer
-      allocate (y(curve%start%system%n))
-      call curve%path%start(curve%start%system, case%solver)
-      call follow(case, curve, observer, state, y, error)
-      if (.not. allocated(error)) call curve%cycles%find(curve%path, curve%table, error)
-      if (.not. allocated(error) .and. .not. curve%start%slides) then
-         call curve%onset%find(curve%path, case%mode%end, .not. state%is_incomplete, &
-                               curve%table%onset, error)
+      if (more .and. case%mode%continuation == continuation_natural) then
+         call next_amplitude(self, case, point, more, error)
+      else if (more .and. self%table%n == 0) then
+         call begin_branch(self, case, point, error)
+      else if (more) then
+         call next_of_branch(self, case, point, more, error)
       end if
-      if (allocated(error)) then
-         if (error%status == status_stopped) then
-            deallocate (error)
-            state%was_stopped = .true.
-            state%is_incomplete = .true.
+      if (allocated(error) .or. more) return
+      call self%cycles%find(self%path, self%table, error)
+      if (allocated(error) .or. self%at_rest%slides) return
+      call self%onset%find(self%path, case%mode%end, .not. self%run%state%is_incomplete, &
+                           self%table%onset, error)
+   end subroutine next
+
+   subroutine conclude(self, case, run, error)
+      class(mode_analysis), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (remarks => run%summary%remarks, balance => self%at_rest%balance)
+         call remark_internal(self%at_rest, self%table, remarks)
+         call self%watch%remark(remarks)
+         call remark_jump(self%jumped_at, case%mode%start, remarks)
+         if (self%begins .and. balance%problem%n_pairs > 0) then
+            call remark_onset(self%table%onset, run%state%is_incomplete, exp(self%end_p), &
+                              case%mode%end, remarks)
          end if
+         call synthesize(case%mode%synthesis, self%table)
+         call run%writer%add(self%table, error)
+         call run%summary%describe_work(balance, self%path%newton%linear, case%solver%kind, &
+                                        run%state%all_converged())
+         call self%about%sensitivity%report(case, balance, run%summary)
+      end associate
+      if (self%begins) then
+         call run%summary%describe_mode(self%table, case%model%observe_name(1)%text, &
+                                        case%mode%control == control_observed, case%mode%end)
       end if
-      call observer%on_end()
-      if (allocated(error)) return
-      call remark_internal(curve%start, curve%table, summary%remarks)
-      call curve%watch%remark(summary%remarks)
-      call remark_jump(curve%jumped_at, case%mode%start, summary%remarks)
-      if (curve%begins .and. curve%start%problem%n_pairs > 0) then
-         call remark_onset(curve%table%onset, state%is_incomplete, exp(curve%end_p), &
-                           case%mode%end, summary%remarks)
-      end if
-      call synthesize(case%mode%synthesis, curve%table)
-      call writer%add(curve%table, error)
-      call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
-                                 state%all_converged())
-      call curve%sensitivity%describe(derivatives)
-      call summary%describe_sensitivity(derivatives)
-      call curve%sensitivity%remark(case, curve%start%balance, summary%remarks)
-      if (curve%begins) then
-         call summary%describe_mode(curve%table, case%model%observe_name(1)%text, &
-                                    case%mode%control == control_observed, case%mode%end)
-      end if
-   end subroutine run_mode
+   end subroutine conclude
 
    subroutine describe_start(start, table)
       type(mode_start), intent(in) :: start
@@ -154,43 +161,38 @@ contains
       end if
    end subroutine describe_start
 
-   !> Up to the lowest amplitude from where the stuck mode is exact, then along the curve.
-   subroutine follow(case, curve, observer, state, y, error)
+   !> Up to the lowest amplitude from where the stuck mode is exact; a point only where that fails.
+   subroutine follow(self, case, observer, point, error)
+      class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(inout), target :: curve
       class(observer_type), intent(inout), target :: observer
-      type(run_state), intent(inout) :: state
-      real(wp), intent(inout), contiguous :: y(:)
+      type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
       real(wp) :: reached
 
-      call system_clock(curve%clock)
-      call begin(case, curve, y, report, error)
-      if (allocated(error)) return
-      if (report%converged) then
-         call curve%path%reach(log(case%mode%start), y, report, reached, error)
+      associate (report => self%report)
+         call begin(case, self, self%y, report, error)
          if (allocated(error)) return
-         if (.not. report%converged) call jump(case, curve, y, report, reached, error)
-         if (allocated(error)) return
-      end if
-      if (.not. report%converged) then
-         call add_row(case, curve, y, report, served_by_newton, state, error)
-         state%is_incomplete = .true.
-         curve%begins = .false.
-         call observer%on_message('the first point did not converge: no curve to follow')
-      else if (case%mode%continuation == continuation_arclength) then
-         call along_branch(case, curve, observer, state, y, report, error)
-      else
-         call along_amplitudes(case, curve, observer, state, y, report, error)
-      end if
+         if (report%converged) then
+            call self%path%reach(log(case%mode%start), self%y, report, reached, error)
+            if (allocated(error)) return
+            if (.not. report%converged) call jump(case, self, self%y, report, reached, error)
+            if (allocated(error)) return
+         end if
+         if (report%converged) return
+         self%begins = .false.
+         self%falls_short = .true.
+         call take_row(case, self, self%y, report, served_by_newton, point, error)
+         if (.not. allocated(error)) call observer%on_message( &
+            'the first point did not converge: no curve to follow')
+      end associate
    end subroutine follow
 
    !> Over a fold below the lowest amplitude, which is not of the curve that was asked for: by long
    !> steps, from where it began.
    subroutine jump(case, curve, y, report, reached, error)
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(inout), target :: curve
+      class(mode_analysis), intent(inout), target :: curve
       real(wp), intent(inout), contiguous :: y(:)
       type(solver_report), intent(inout) :: report
       real(wp), intent(inout) :: reached
@@ -214,7 +216,7 @@ contains
    !> The first solution, below the onset.
    subroutine begin(case, curve, y, report, error)
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(inout), target :: curve
+      class(mode_analysis), intent(inout), target :: curve
       real(wp), intent(inout), contiguous :: y(:)
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
@@ -226,62 +228,60 @@ contains
 
       mu = spread(0.0_wp, 1, case%contact%n_pairs)
       if (case%contact%n_pairs > 0) mu = case%contact%mu
-      call curve%onset%begin(curve%start%system, curve%start%y, case%mode%start, mu, amplitude)
+      call curve%onset%begin(curve%at_rest%system, curve%at_rest%y, case%mode%start, mu, amplitude)
       ! The sliding mode is the limit of high amplitudes.
-      if (curve%start%slides) amplitude = case%mode%end
+      if (curve%at_rest%slides) amplitude = case%mode%end
       do k = 1, most_smaller
-         y = curve%start%y
+         y = curve%at_rest%y
          call curve%path%solve(log(amplitude), y, report, error)
          if (allocated(error)) return
-         if (report%converged .and. (curve%start%slides .or. curve%start%problem%n_pairs == 0)) exit
+         if (report%converged .and. (curve%at_rest%slides .or. &
+                                     curve%at_rest%problem%n_pairs == 0)) exit
          if (report%converged) then
-            if (curve%onset%is_stuck(curve%start%system, y)) exit
+            if (curve%onset%is_stuck(curve%at_rest%system, y)) exit
          end if
          ! About another position, or springs: nearer to the linear mode.
-         amplitude = merge(1.0_wp/smaller, smaller, curve%start%slides)*amplitude
+         amplitude = merge(1.0_wp/smaller, smaller, curve%at_rest%slides)*amplitude
       end do
-      if (.not. (report%converged .or. curve%start%slides)) then
+      if (.not. (report%converged .or. curve%at_rest%slides)) then
          amplitude = case%mode%start
-         call begin_apart(curve%path, curve%start%y, amplitude, y, report, error)
+         call begin_apart(curve%path, curve%at_rest%y, amplitude, y, report, error)
          if (allocated(error)) return
       end if
       if (.not. report%converged) return
-      call curve%onset%note(curve%start%system, y)
+      call curve%onset%note(curve%at_rest%system, y)
       curve%first_p = log(amplitude)
       curve%first_y = y
       call curve%path%restart(curve%first_p, y)
    end subroutine begin
 
-   !> Points at given amplitudes.
-   subroutine along_amplitudes(case, curve, observer, state, y, first, error)
+   !> The point at the next of the given amplitudes.
+   subroutine next_amplitude(self, case, point, more, error)
+      class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(inout), target :: curve
-      class(observer_type), intent(inout), target :: observer
-      type(run_state), intent(inout) :: state
-      real(wp), intent(inout), contiguous :: y(:)
-      type(solver_report), intent(in) :: first
+      type(point_type), intent(inout) :: point
+      logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
       real(wp) :: reached
-      integer :: before, k
+      integer :: before
 
-      report = first
-      do k = 1, case%mode%n_points
-         before = curve%path%iterations
-         call curve%path%reach(amplitude_of(case, k), y, report, reached, error)
+      more = self%table%n < case%mode%n_points
+      if (.not. more) return
+      associate (report => self%report)
+         before = self%path%iterations
+         call self%path%reach(amplitude_of(case, self%table%n + 1), self%y, report, reached, error)
          if (allocated(error)) return
-         if (.not. report%converged .or. is_lost(y)) then
-            call end_early(case, observer, state, exp(reached), &
-                           'no solution was found beyond')
+         more = report%converged .and. .not. is_lost(self%y)
+         if (.not. more) then
+            call end_early(self, case, exp(reached), 'no solution was found beyond')
             return
          end if
-         report%iterations = curve%path%iterations - before
-         call settle_phase(curve, y, report, error)
-         if (.not. allocated(error)) call add_row(case, curve, y, report, served_by_newton, state, &
-                                                  error)
+         report%iterations = self%path%iterations - before
+         call settle_phase(self, self%y, report, error)
          if (allocated(error)) return
-      end do
-   end subroutine along_amplitudes
+         call take_row(case, self, self%y, report, served_by_newton, point, error)
+      end associate
+   end subroutine next_amplitude
 
    !> ln A of point k: of a list, or evenly spaced, both ends exact.
    pure real(wp) function amplitude_of(case, k) result(p)
@@ -305,27 +305,27 @@ contains
    end function is_lost
 
    !> Say where the curve ended short of its highest amplitude, and why it may have.
-   subroutine end_early(case, observer, state, amplitude, reason)
+   subroutine end_early(self, case, amplitude, reason)
+      class(mode_analysis), intent(inout) :: self
       type(case_type), intent(in) :: case
-      class(observer_type), intent(inout) :: observer
-      type(run_state), intent(inout) :: state
       real(wp), intent(in) :: amplitude
       character(*), intent(in) :: reason
       character(:), allocatable :: why
 
-      state%is_incomplete = .true.
+      self%falls_short = .true.
       why = 'nothing may hold the structure once all pairs slip'
       if (case%mode%continuation == continuation_natural) why = why//", or the curve folds, "// &
          "which mode%continuation = 'arclength' follows"
-      call observer%on_message('the mode ended: '//reason//' the amplitude '//to_text(amplitude)// &
-                               ' of '//to_text(case%mode%end)//'; '//why)
+      call self%run%observer%on_message('the mode ended: '//reason//' the amplitude '// &
+                                        to_text(amplitude)//' of '//to_text(case%mode%end)// &
+                                        '; '//why)
    end subroutine end_early
 
    !> Turn the motion so that the first observed quantity has a positive cosine and no sine, and
    !> solve there: paths that start at rest depend on where the period starts, so that the turned
    !> motion may be no solution, and that near it have another phase again.
    subroutine settle_phase(curve, y, report, error)
-      type(mode_curve), intent(inout), target :: curve
+      class(mode_analysis), intent(inout), target :: curve
       real(wp), intent(inout), contiguous :: y(:)
       type(solver_report), intent(inout) :: report
       type(error_type), allocatable, intent(out) :: error
@@ -334,11 +334,11 @@ contains
       real(wp) :: before(size(y))
       integer :: k
 
-      associate (system => curve%start%system)
+      associate (system => curve%at_rest%system)
          if (system%control == control_observed) return
          do k = 1, most_turns
             before = y
-            call turn(curve%start, y)
+            call turn(curve%at_rest, y)
             call system%remember(y)
             call curve%path%solve(log(system%amplitude), y, again, error)
             if (allocated(error)) return
@@ -384,25 +384,18 @@ contains
       end associate
    end subroutine turn
 
-   !> Points of the branch in the order in which it has them.
-   subroutine along_branch(case, curve, observer, state, y, first, error)
+   !> The branch from the first solution, which is its first point.
+   subroutine begin_branch(self, case, point, error)
+      class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(inout), target :: curve
-      class(observer_type), intent(inout), target :: observer
-      type(run_state), intent(inout) :: state
-      real(wp), intent(inout), contiguous :: y(:)
-      type(solver_report), intent(in) :: first
+      type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: found
-      type(solver_report) :: report
-      logical :: more
 
-      report = first
-      call settle_phase(curve, y, report, error)
+      call settle_phase(self, self%y, self%report, error)
       if (allocated(error)) return
-      associate (branch => curve%branch)
+      associate (branch => self%branch, system => self%at_rest%system)
          ! The tangent of the branch takes the whole derivative.
-         curve%start%system%reduced = .false.
+         system%reduced = .false.
          branch%options = case%solver
          branch%start = log(case%mode%start)
          branch%finish = log(case%mode%end)
@@ -410,78 +403,70 @@ contains
          branch%step = 1.0_wp/real(case%mode%n_points - 1, wp)
          ! Nothing of the curve is known beforehand: tongues of internal resonances are narrow.
          branch%longest = min(branch%longest, branch%step)
-         call branch%begin(curve%start%system, y, error)
-         if (.not. allocated(error)) call add_row(case, curve, y, report, served_by_arclength, &
-                                                  state, error)
-         do while (.not. allocated(error))
-            call branch%next(curve%start%system, found, more, error)
-            if (allocated(error) .or. .not. more) exit
-            if (is_lost(found%x)) then
-               call end_early(case, observer, state, exp(found%p), 'its frequency '// &
-                              'vanishes at')
-               return
-            end if
-            call add_turned_row(case, curve, found, state, error)
-         end do
-         call curve%path%newton%linear%add_work(branch%corrector%linear)
-         if (allocated(error)) return
-         if (branch%complete) return
-         call end_early(case, observer, state, exp(curve%end_p), branch%ending//', at')
+         call branch%begin(system, self%y, error)
       end associate
-   end subroutine along_branch
+      if (allocated(error)) return
+      call take_row(case, self, self%y, self%report, served_by_arclength, point, error)
+   end subroutine begin_branch
 
-   !> A point of the branch with the phase that results have: the branch itself keeps the one that
-   !> it began with.
-   subroutine add_turned_row(case, curve, found, state, error)
+   !> The next point with the phase that results have: the branch itself keeps the one that it
+   !> began with.
+   subroutine next_of_branch(self, case, point, more, error)
+      class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(inout), target :: curve
-      type(branch_point), intent(in) :: found
-      type(run_state), intent(inout) :: state
+      type(point_type), intent(inout) :: point
+      logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
-      real(wp), allocatable :: y(:)
+      type(branch_point) :: found
       complex(wp), allocatable :: before(:)
 
-      associate (system => curve%start%system)
-         y = found%x
-         report = found%report
-         before = system%before
-         call system%set_parameter(found%p, error)
-         if (.not. allocated(error)) call settle_phase(curve, y, report, error)
-         if (.not. allocated(error)) call add_row(case, curve, y, report, served_by_arclength, &
-                                                  state, error)
-         system%before = before
+      associate (branch => self%branch, system => self%at_rest%system)
+         call branch%next(system, found, more, error)
+         if (more .and. .not. allocated(error)) then
+            more = .not. is_lost(found%x)
+            if (more) then
+               before = system%before
+               call system%set_parameter(found%p, error)
+               if (.not. allocated(error)) then
+                  call settle_phase(self, found%x, found%report, error)
+               end if
+               if (.not. allocated(error)) call take_row(case, self, found%x, found%report, &
+                                                         served_by_arclength, point, error)
+               system%before = before
+               if (.not. allocated(error)) return
+            else
+               call end_early(self, case, exp(found%p), 'its frequency vanishes at')
+               return
+            end if
+         end if
+         call self%path%newton%linear%add_work(branch%corrector%linear)
+         if (allocated(error) .or. branch%complete) return
+         call end_early(self, case, exp(self%end_p), branch%ending//', at')
       end associate
-   end subroutine add_turned_row
+   end subroutine next_of_branch
 
    !> A point of the result from the unknowns at the present amplitude.
-   subroutine add_row(case, curve, unknowns, report, served_by, state, error)
+   subroutine take_row(case, curve, unknowns, report, served_by, point, error)
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(inout), target :: curve
+      class(mode_analysis), intent(inout), target :: curve
       real(wp), intent(in) :: unknowns(:)
       type(solver_report), intent(in) :: report
       integer, intent(in) :: served_by
-      type(run_state), intent(inout) :: state
+      type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(point_type) :: point
       type(mode_row) :: row
       real(wp), allocatable :: y(:), q(:), r(:)
-      integer(int64) :: now, rate
 
       y = unknowns
-      associate (system => curve%start%system, balance => curve%start%balance)
+      associate (system => curve%at_rest%system, balance => curve%at_rest%balance)
          allocate (q(balance%n), r(system%n))
          ! Newton's method has left the system at this point, a branch has gone on.
          if (served_by /= served_by_newton) call system%residual(y, r)
          call system%to_balance(y, q, row%omega, row%self_excitation)
-         point%omega = row%omega
-         point%converged = report%converged
-         point%residual = report%residual
-         point%iterations = report%iterations
-         if (report%converged) point%served_by = served_by
-         call recover_point(balance, q, case%harmonics%n_harmonics, case%output%contact, point)
-         point%n_harmonics = case%harmonics%n_harmonics
-         point%n_time = balance%problem%fourier%n_time
+         call curve%about%describe(case, new_request(case, row%omega), &
+                                   case%harmonics%n_harmonics, balance, q, report, served_by, &
+                                   point, error)
+         if (allocated(error)) return
          row%amplitude = system%amplitude
          row%converged = report%converged
          row%modal_amplitude = system%modal_amplitude(y)*system%amplitude
@@ -489,25 +474,20 @@ contains
          point%self_excitation = row%self_excitation
          point%modal_amplitude = row%modal_amplitude
          point%first_harmonic = hypot(row%first(1, :), row%first(2, :))
-         row%force = modal_force(curve%start, y)*system%length()/row%modal_amplitude
+         row%force = modal_force(curve%at_rest, y)*system%length()/row%modal_amplitude
          if (report%converged) call curve%onset%note(system, y)
          if (report%converged .and. served_by == served_by_newton) then
             call curve%watch%note(system, y)
          end if
          if (report%converged .and. case%sensitivity%is_wanted()) then
-            call curve%sensitivity%find_mode(case, system, y, point)
+            call curve%about%sensitivity%find_mode(case, system, y, point)
          end if
       end associate
-      call system_clock(now, rate)
-      point%seconds = real(now - curve%clock, wp)/real(rate, wp)
-      curve%clock = now
-      call curve%sinks%take(point, error)
-      if (allocated(error)) return
-      call state%note(point)
+      call curve%about%note_seconds(point)
       curve%end_p = log(row%amplitude)
       call curve%cycles%note(row, unknowns)
       call curve%table%add(row)
-   end subroutine add_row
+   end subroutine take_row
 
    !> |U_1^H F| for the vibratory load of the case, over the size of the motion.
    real(wp) function modal_force(start, y) result(force)

@@ -1,19 +1,26 @@
 !> Runs analysis 'modes', and lists the natural frequencies that a sweep covers.
 module fw_run_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+   use fw_analysis, only: analysis, run_type
    use fw_case, only: analyses, case_type
    use fw_cyclic_group, only: modes_group
    use fw_error, only: error_type
    use fw_kinds, only: pi, wp
    use fw_natural_modes, only: find_natural_modes, natural_modes
-   use fw_result, only: result_writer
+   use fw_remarks, only: remark_unused
    use fw_solver_options, only: unit_hertz, unit_words
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private
 
-   public :: run_modes, list_in_range
+   public :: modes_analysis, list_in_range
+
+   type, extends(analysis) :: modes_analysis
+   contains
+      procedure :: start
+      procedure :: check
+   end type modes_analysis
 
    !> Frequencies of a line of a table, and dofs up to which a check looks for them: eigenvalues
    !> take seconds from there on.
@@ -24,16 +31,19 @@ module fw_run_modes
 contains
 
    !> Find, write and tabulate the natural frequencies of all nodal diameters.
-   subroutine run_modes(case, writer, table, error)
-      type(case_type), intent(in) :: case
-      type(result_writer), intent(inout) :: writer
-      type(string_type), allocatable, intent(out) :: table(:)
+   subroutine start(self, case, run, error)
+      class(modes_analysis), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
       type(natural_modes) :: modes
       type(modes_group) :: group
       character(:), allocatable :: text, name
       integer :: j
 
+      associate (unused => self)
+      end associate
+      call remark_unused(case, run%summary%remarks)
       call find_natural_modes(case, min(case%model%cyclic%n_modes, most_of(case)), modes, error)
       if (allocated(error)) return
       group%nodal_diameter = modes%nodal_diameter
@@ -43,22 +53,32 @@ contains
          group%open_damping = modes%open_damping
          group%closed_damping = modes%closed_damping
       end if
-      call writer%add(group, error)
+      call run%writer%add(group, error)
       if (allocated(error)) return
-      allocate (table(0))
+      allocate (run%table(0))
       text = 'natural frequencies ['//trim(unit_words(case%sweep%unit))//']'
       if (case%model%cyclic%is_cyclic) text = text//' of each nodal diameter'
-      call append(table, text)
+      call append(run%table, text)
       do j = 1, size(modes%nodal_diameter)
          name = ''
          if (case%model%cyclic%is_cyclic) name = to_text(modes%nodal_diameter(j))//' '
          call line_of(case, modes%open(:, j), -1.0_wp, huge(1.0_wp), text)
-         call append(table, name//'open'//text)
+         call append(run%table, name//'open'//text)
          if (case%contact%n_pairs == 0) cycle
          call line_of(case, modes%closed(:, j), -1.0_wp, huge(1.0_wp), text)
-         call append(table, name//'closed'//text)
+         call append(run%table, name//'closed'//text)
       end do
-   end subroutine run_modes
+   end subroutine start
+
+   !> No vibration is built.
+   subroutine check(self, case, error)
+      class(modes_analysis), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (unused => self, unused_case => case)
+      end associate
+   end subroutine check
 
    !> No more modes than coordinates.
    pure integer function most_of(case)

@@ -2,10 +2,11 @@
 module fw_run_state
    use fw_error, only: status_not_converged, status_ok, status_stopped
    use fw_point, only: point_type
+   use fw_text, only: string_type
    implicit none (type, external)
    private
 
-   public :: run_state
+   public :: run_state, outcome_type
 
    type :: run_state
       !> Points that count, and those of them that converged.
@@ -21,6 +22,16 @@ module fw_run_state
       procedure :: status
       procedure :: words
    end type run_state
+
+   !> What a run leaves besides its result file.
+   type :: outcome_type
+      !> status_ok, status_not_converged, or status_stopped where the observer ended the run.
+      integer :: status = status_ok
+      !> Its time was over (case%max_seconds).
+      logical :: out_of_time = .false.
+      !> A short table for people, one line each.
+      type(string_type), allocatable :: summary(:)
+   end type outcome_type
 
 contains
 

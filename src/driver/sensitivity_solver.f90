@@ -19,6 +19,7 @@ module fw_sensitivity_solver
    use fw_response_rows, only: load_scale, mode_damping_ratio, mode_omega, resonance_omega
    use fw_sensitivity, only: sensitivity_finder
    use fw_sensitivity_options, only: of_itself
+   use fw_summary, only: summary_type
    use fw_text, only: to_text
    use fw_wear_options, only: wear_energy
    implicit none (type, external)
@@ -43,8 +44,7 @@ module fw_sensitivity_solver
       procedure :: find_controlled
       procedure :: renew
       procedure :: follow
-      procedure :: describe
-      procedure :: remark
+      procedure :: report
    end type sensitivity_solver
 
 contains
@@ -315,35 +315,34 @@ contains
       end associate
    end function is_at_onset
 
-   !> How derivatives were found, for the summary; blank where none were.
-   subroutine describe(self, text)
+   !> How derivatives were found, and what makes them less than they seem.
+   subroutine report(self, case, system, summary)
       class(sensitivity_solver), intent(in) :: self
-      character(:), allocatable, intent(out) :: text
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(in) :: system
+      type(summary_type), intent(inout) :: summary
+      character(:), allocatable :: text
 
-      text = ''
       if (self%n_points == 0) return
+      text = 'direct: '//to_text(self%finder%n_direct)
+      if (self%finder%n_adjoint > 0) text = 'adjoint: '//to_text(self%finder%n_adjoint)
       text = to_text(size(self%finder%parameters))//' parameters of '// &
-             to_text(size(self%finder%rows))//' quantities, '
-      if (self%finder%n_adjoint > 0) then
-         text = text//'adjoint: '//to_text(self%finder%n_adjoint)
-      else
-         text = text//'direct: '//to_text(self%finder%n_direct)
-      end if
-      text = text//' solutions at '//to_text(self%n_points)//' points, '// &
+             to_text(size(self%finder%rows))//' quantities, '//text//' solutions at '// &
+             to_text(self%n_points)//' points, '// &
              to_text(self%finder%linear%factorizations)//' factorizations'
       if (self%finder%linear%krylov_iterations > 0) then
          text = text//', '//to_text(self%finder%linear%krylov_iterations)//' of GMRES'
       end if
-   end subroutine describe
+      call summary%line('derivatives', text)
+      call remark(self, case, system, summary%remarks)
+   end subroutine report
 
-   !> What makes derivatives less than they seem.
    subroutine remark(self, case, system, remarks)
-      class(sensitivity_solver), intent(in) :: self
+      type(sensitivity_solver), intent(in) :: self
       type(case_type), intent(in) :: case
       type(balance_state), intent(in) :: system
       type(remark_list), intent(inout) :: remarks
 
-      if (self%n_points == 0) return
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
          if (case%contact%n_pairs > 0 .and. law%facts%has_events .and. &
              .not. law%facts%follows_events) then

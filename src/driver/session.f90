@@ -13,7 +13,7 @@ module fw_session
    use fw_namelist, only: parse_override
    use fw_namelist_data, only: entry_type
    use fw_observer, only: observer_type
-   use fw_outcome, only: outcome_type
+   use fw_run_state, only: outcome_type
    use fw_paths, only: read_text_file
    use fw_point, only: point_type
    use fw_point_values, only: get_point_values

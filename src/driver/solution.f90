@@ -104,19 +104,36 @@ contains
       real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(out) :: report
       type(formulation_type), target :: formulation
-      class(parameter_system), pointer :: solved
+      type(difference_system), target :: by_differences
+      class(parameter_system), pointer :: given, solved
       real(wp), allocatable :: unknowns(:)
+      logical :: reduced
       integer :: iterations, trial
 
       iterations = 0
       call formulation%begin(system)
-      solved => formulation%as_solved()
+      given => formulation%as_solved()
+      solved => given
+      reduced = given%reduced
+      if (self%newton%options%jacobian == jacobian_difference) then
+         ! The solver sees a system like any other, whose products are differences.
+         by_differences = new_difference_system(given)
+         solved => by_differences
+      end if
       allocate (unknowns(system%n))
       call formulation%from_coefficients(x, unknowns)
       do trial = 1, 2
-         call solve_system(self, solved, unknowns, report)
+         select case (self%kind)
+         case (solver_powell)
+            call self%powell%solve(solved, unknowns, report)
+         case (solver_kinsol)
+            call self%kinsol%solve(solved, unknowns, report)
+         case default
+            call self%newton%solve(solved, unknowns, report)
+         end select
          report%iterations = report%iterations + iterations
          call formulation%to_coefficients(unknowns, x)
+         if (self%newton%options%jacobian == jacobian_difference) given%reduced = reduced
          ! Newton's method evaluates what it accepts last; other solvers, and formulations with
          ! unknowns of their own, may have been elsewhere.
          self%stands = report%converged .and. self%kind /= solver_powell .and. &
@@ -143,43 +160,6 @@ contains
          if (is_lasting .and. contact%all_open()) is_lasting = held_without_contact(system)
       end associate
    end function is_lasting
-
-   !> With the derivative that the case asks for.
-   subroutine solve_system(self, system, x, report)
-      class(solution_method), intent(inout) :: self
-      class(parameter_system), intent(inout), target :: system
-      real(wp), intent(inout), contiguous :: x(:)
-      type(solver_report), intent(out) :: report
-      type(difference_system), target :: by_differences
-      logical :: reduced
-
-      if (self%newton%options%jacobian /= jacobian_difference) then
-         call solve_with(self, system, x, report)
-         return
-      end if
-      reduced = system%reduced
-      by_differences = new_difference_system(system)
-      ! The solver sees a system like any other, whose products are differences.
-      call solve_with(self, by_differences, x, report)
-      system%reduced = reduced
-   end subroutine solve_system
-
-   !> By the solver that the case asks for; pseudo-time has an entry of its own.
-   subroutine solve_with(self, system, x, report)
-      class(solution_method), intent(inout) :: self
-      class(parameter_system), intent(inout), target :: system
-      real(wp), intent(inout), contiguous :: x(:)
-      type(solver_report), intent(out) :: report
-
-      select case (self%kind)
-      case (solver_powell)
-         call self%powell%solve(system, x, report)
-      case (solver_kinsol)
-         call self%kinsol%solve(system, x, report)
-      case default
-         call self%newton%solve(system, x, report)
-      end select
-   end subroutine solve_with
 
    !> Integrate in pseudo-time on the whole structure, at the frequency and from the guess of the
    !> condensed one.
@@ -208,13 +188,7 @@ contains
       end if
       call self%whole%follow(system, error)
       if (allocated(error)) return
-      ! Memory and reference, too.
-      self%whole%depth = system%depth
-      associate (pairs => system%problem%forces%pairs)
-         self%whole%work(pairs)%x_start = system%work(pairs)%x_start
-      end associate
       self%whole%reference = system%reference
-      self%whole%interrupt => system%interrupt
       allocate (whole_x(self%whole%n))
       call carry_solution(system, x, self%whole, whole_x)
       call new_flow(self%whole, pseudo%flow, flow)

@@ -82,11 +82,6 @@ contains
       if (.not. allocated(self%fine)) call build(self, case, system, error)
       if (.not. allocated(error)) call self%fine%follow(system, error)
       if (allocated(error)) return
-      self%fine%interrupt => system%interrupt
-      self%fine%depth = system%depth
-      associate (pairs => system%problem%forces%pairs)
-         self%fine%work(pairs)%x_start = system%work(pairs)%x_start
-      end associate
       allocate (y(self%fine%n))
       call carry_solution(system, x, self%fine, y)
       call self%newton%solve(self%fine, y, report)

@@ -68,19 +68,12 @@ module fw_summary
       procedure :: add_transient
       procedure :: remark_instants
       procedure :: describe_work
-      procedure :: describe_sensitivity
       procedure :: describe_peaks
       procedure :: describe_bifurcations
-      procedure :: note_fallback
-      procedure :: leave_fallback
-      procedure :: note_elsewhere
-      procedure :: describe_harmonics
+      procedure :: line
       procedure :: describe_accuracy
-      procedure :: describe_wear
       procedure :: describe_mode
       procedure :: describe_resonance
-      procedure :: note_restart
-      procedure :: note_profile_change
       procedure :: lines
    end type summary_type
 
@@ -200,14 +193,6 @@ contains
       end if
    end subroutine describe_work
 
-   !> How derivatives were found.
-   subroutine describe_sensitivity(self, text)
-      class(summary_type), intent(inout) :: self
-      character(*), intent(in) :: text
-
-      if (len(text) > 0) call add_line(self%work, 'derivatives', text)
-   end subroutine describe_sensitivity
-
    !> The maxima between the points, which stand for those of the points.
    subroutine describe_peaks(self, peaks, n_solved, iterations)
       class(summary_type), intent(inout) :: self
@@ -294,47 +279,13 @@ contains
       call add_line(self%work, 'skipped', words)
    end subroutine skip
 
-   !> Points that only the pseudo-time fallback has solved.
-   subroutine note_fallback(self, n_points)
+   !> A line about the work, of whoever knows it.
+   subroutine line(self, label, text)
       class(summary_type), intent(inout) :: self
-      integer, intent(in) :: n_points
+      character(*), intent(in) :: label, text
 
-      call add_line(self%work, 'fallback', 'pseudo-time served '//to_text(n_points)//' points')
-   end subroutine note_fallback
-
-   !> Points of cyclic structures that did not converge might have done with it.
-   subroutine leave_fallback(self)
-      class(summary_type), intent(inout) :: self
-
-      call add_line(self%work, 'left out', 'pseudo-time, which cyclic structures do not have')
-   end subroutine leave_fallback
-
-   !> Points that easier balances of the same case led to.
-   subroutine note_elsewhere(self, n_points, way)
-      class(summary_type), intent(inout) :: self
-      integer, intent(in) :: n_points
-      !> What did so.
-      character(*), intent(in) :: way
-
-      call add_line(self%work, 'other balances', 'served '//to_text(n_points)//' points, '//way)
-   end subroutine note_elsewhere
-
-   !> How many harmonics the points took.
-   subroutine describe_harmonics(self, n_short, tolerance)
-      class(summary_type), intent(inout) :: self
-      !> Points that left out more than the tolerance with the most harmonics allowed.
-      integer, intent(in) :: n_short
-      real(wp), intent(in) :: tolerance
-      character(10) :: text
-
-      call add_line(self%work, 'harmonics', to_text(self%harmonics(1))//' to '// &
-                    to_text(self%harmonics(2)))
-      if (n_short == 0) return
-      write (text, '(es8.1)') tolerance
-      call add_line(self%work, '', 'too few at '//to_text(n_short)//' points, which leave '// &
-                    'out more than '//trim(adjustl(text))//' of the force: '// &
-                    'raise harmonics%n_harmonics')
-   end subroutine describe_harmonics
+      call add_line(self%work, label, text)
+   end subroutine line
 
    !> What the points took to be accurate.
    subroutine describe_accuracy(self, worst, accuracy, n_claimed, n_short)
@@ -363,28 +314,6 @@ contains
          to_text(n_short)//' of '//to_text(n_claimed + n_short)//' points'
       call add_line(self%work, 'error', words)
    end subroutine describe_accuracy
-
-   !> What became of the wear.
-   subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth, otherwise)
-      class(summary_type), intent(inout) :: self
-      character(*), intent(in) :: steady_state
-      integer, intent(in) :: n_steps, n_rejected
-      !> Cycles covered, and largest depth at their end [length].
-      real(wp), intent(in) :: cycles, depth
-      !> Steps that were left to the implicit scheme, and leaps.
-      integer, intent(in) :: otherwise(2)
-      character(40) :: text
-
-      write (text, '(es13.6, a, es13.6)') depth, ' after ', cycles
-      call add_line(self%work, 'steady state', steady_state)
-      call add_line(self%work, 'largest depth', trim(adjustl(text))//' cycles')
-      call add_line(self%work, 'wear steps', to_text(n_steps)//', '//to_text(n_rejected)// &
-                    ' repeated')
-      if (otherwise(1) > 0) call add_line(self%work, '', to_text(otherwise(1))// &
-                                          ' of them implicit')
-      if (otherwise(2) > 0) call add_line(self%work, '', to_text(otherwise(2))// &
-                                          ' of them over what no other step passes')
-   end subroutine describe_wear
 
    !> What a nonlinear mode is, and where it slips and keeps itself alive.
    subroutine describe_mode(self, table, name, by_observed, highest)
@@ -479,29 +408,6 @@ contains
       write (text, '(es9.2)') value
       text = adjustl(text)
    end function short
-
-   !> The run that was continued.
-   subroutine note_restart(self, n_steps, path)
-      class(summary_type), intent(inout) :: self
-      !> Steps taken over, the start included.
-      integer, intent(in) :: n_steps
-      character(*), intent(in) :: path
-
-      call add_line(self%work, 'continued', 'after '//to_text(n_steps)//' rows of '//path)
-   end subroutine note_restart
-
-   !> What steps of half the size change.
-   subroutine note_profile_change(self, change, n_steps)
-      class(summary_type), intent(inout) :: self
-      !> Of the final depths, as a part of the largest.
-      real(wp), intent(in) :: change
-      integer, intent(in) :: n_steps
-      character(16) :: text
-
-      write (text, '(es9.2)') change
-      call add_line(self%work, 'steps halved', 'profile moves by '//trim(adjustl(text))// &
-                    ' of the largest depth ('//to_text(n_steps)//' steps)')
-   end subroutine note_profile_change
 
    !> The table (seconds: elapsed time).
    function lines(self, state, seconds) result(table)

@@ -1,25 +1,25 @@
-!> The one loop over the points of a run: a source gives them one after the other, sinks take them.
+!> Where the points of a run come from: given places, in their order, or a source that chooses.
 module fw_sweep
    use fw_case, only: analyses, case_type
-   use fw_error, only: error_type, status_stopped
+   use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
-   use fw_run_state, only: run_state
-   use fw_sinks, only: sink_list
    use fw_solver_options, only: sweep_options
-   use fw_strategy, only: new_request, point_request, point_strategy, solver_memory
+   use fw_strategy, only: new_request, note_time_limit, point_request, point_strategy, &
+      solver_memory
    implicit none (type, external)
    private
 
-   public :: point_source, list_source, run_sweep, sweep_frequency, sweep_places, lead_places
-   public :: path_ends
+   public :: point_source, list_source, sweep_frequency, sweep_places, lead_places, path_ends
 
    !> Where points come from: given frequencies, or a branch that chooses its own.
    type, abstract :: point_source
+      !> It ended before it had covered what was asked for.
+      logical :: falls_short = .false.
    contains
       procedure(next_point), deferred :: next
-      procedure(is_covered), deferred :: is_covered
+      procedure :: is_covered
       procedure :: finish
       procedure :: remember
    end type point_source
@@ -29,7 +29,7 @@ module fw_sweep
       subroutine next_point(self, case, observer, point, more, error)
          import :: point_source, case_type, observer_type, point_type, error_type
          implicit none (type, external)
-         class(point_source), intent(inout) :: self
+         class(point_source), intent(inout), target :: self
          type(case_type), intent(in) :: case
          !> Told what is worth knowing on the way.
          class(observer_type), intent(inout), target :: observer
@@ -37,13 +37,6 @@ module fw_sweep
          logical, intent(out) :: more
          type(error_type), allocatable, intent(out) :: error
       end subroutine next_point
-
-      !> Whether everything that was asked for has been given.
-      pure logical function is_covered(self)
-         import :: point_source
-         implicit none (type, external)
-         class(point_source), intent(in) :: self
-      end function is_covered
    end interface
 
    !> Given frequencies, or values of the parameter that the sweep goes over, in their order.
@@ -66,33 +59,12 @@ module fw_sweep
 
 contains
 
-   !> Until the source has no more, something fails, or the observer asks for the end.
-   subroutine run_sweep(case, source, sinks, observer, state, error)
-      type(case_type), intent(in) :: case
-      class(point_source), intent(inout) :: source
-      type(sink_list), intent(inout) :: sinks
-      class(observer_type), intent(inout), target :: observer
-      type(run_state), intent(inout) :: state
-      type(error_type), allocatable, intent(out) :: error
-      type(point_type) :: point
-      logical :: more
+   !> Whether everything that was asked for has been given.
+   pure logical function is_covered(self)
+      class(point_source), intent(in) :: self
 
-      do while (.not. observer%is_stopping())
-         call source%next(case, observer, point, more, error)
-         if (allocated(error) .or. .not. more) exit
-         call sinks%take(point, error)
-         if (allocated(error)) exit
-         ! Counted only once all sinks have it.
-         call state%note(point)
-      end do
-      if (allocated(error)) then
-         ! The point at work when the stop came is no row.
-         if (error%status == status_stopped) deallocate (error)
-      end if
-      if (.not. allocated(error)) call source%finish(case, observer)
-      state%was_stopped = observer%stop_requested
-      state%is_incomplete = state%is_incomplete .or. .not. source%is_covered()
-   end subroutine run_sweep
+      is_covered = .not. self%falls_short
+   end function is_covered
 
    !> After the last point: what is worth telling of the whole; nothing unless a source has more.
    subroutine finish(self, case, observer)
@@ -123,7 +95,7 @@ contains
 
    !> Solve at the next place of the list; a point that fails is given all the same.
    subroutine next_of_list(self, case, observer, point, more, error)
-      class(list_source), intent(inout) :: self
+      class(list_source), intent(inout), target :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
@@ -131,8 +103,10 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_request) :: request
 
+      ! Who asks for the end may ask for fewer points.
+      more = .not. observer%is_stopping()
       self%n_wanted = observer%n_wanted
-      more = .not. self%is_covered()
+      more = more .and. .not. self%is_covered()
       if (.not. more) return
       if (self%n_given == 0 .and. allocated(self%lead)) then
          call come_to_first(self, case, observer, error)
@@ -140,8 +114,11 @@ contains
       end if
       request = new_request(case, self%place(self%n_given + 1), observer)
       if (allocated(self%amplitude)) request%amplitude = self%amplitude(self%n_given + 1)
-      call self%strategy%solve_in_time(case, request, point, error)
+      call observer%limit_point(case%solver%max_seconds)
+      call self%strategy%solve(case, request, point, error)
       if (allocated(error)) return
+      if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
+      call observer%limit_point(0.0_wp)
       if (allocated(point%note)) call observer%on_message(point%note)
       if (allocated(self%strategy%note)) call observer%on_message(self%strategy%note)
       self%n_given = self%n_given + 1

@@ -2,22 +2,19 @@
 !> depths, what was worn, the friction energy that it took, and whether more harmonics would have
 !> worn the same pairs.
 module fw_wear_recorder
-   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_analysis, only: run_type
    use fw_case, only: case_type
+   use fw_describe, only: describer
    use fw_error, only: error_type, status_stopped
    use fw_finer_wear, only: finer_wear
    use fw_kinds, only: wp
-   use fw_observer, only: observer_type
+   use fw_newton, only: solver_report
    use fw_patches, only: patch_volumes
-   use fw_point, only: point_type
+   use fw_point, only: point_type, served_by_none
    use fw_point_solver, only: point_solver
-   use fw_recovery, only: recover_histories, recover_point
    use fw_restart_rows, only: restart_row_set
-   use fw_result, only: result_writer
    use fw_solution, only: is_lasting
-   use fw_run_state, only: run_state
    use fw_strategy, only: new_request, point_request
-   use fw_summary, only: summary_type
    use fw_wear_march, only: wear_march, wear_observer
    use fw_wear_options, only: wear_energy, wear_pseudo_time
    use fw_wear_step, only: largest_lag, wear_state
@@ -27,21 +24,18 @@ module fw_wear_recorder
 
    public :: wear_recorder, friction_energy
 
-   !> Points at what a run owns; rows are counted by the state of the run.
+   !> Rows are counted by the state of the run.
    type, extends(wear_observer) :: wear_recorder
       type(case_type), pointer :: case => null()
-      class(observer_type), pointer :: observer => null()
-      type(result_writer), pointer :: writer => null()
-      type(summary_type), pointer :: summary => null()
-      type(run_state), pointer :: state => null()
+      type(run_type), pointer :: run => null()
       type(restart_row_set) :: restart_rows
       !> What twice the harmonics say.
       type(finer_wear) :: finer
       !> Friction energy up to the last row (n_pairs) [force*length], and the depths there.
       real(wp), allocatable :: energy(:), depth(:)
-      !> Rows written so far, and the clock at the last of them.
+      !> Rows written so far, and what makes points of states.
       integer :: n_rows = 0
-      integer(int64) :: clock = 0_int64
+      type(describer) :: about
    contains
       procedure :: take
       procedure :: begin_slip
@@ -62,23 +56,28 @@ contains
       logical, intent(out) :: go_on
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
-      integer(int64) :: clock, rate
+      type(point_request) :: request
+      type(solver_report) :: report
       integer :: n
 
       go_on = .false.
       n = system%n_vibration()
-      point%omega = system%vibration%frequency()
+      request = new_request(self%case, system%vibration%frequency())
+      ! Energy is that of the forces, whether these are written or not.
+      request%contact = .true.
+      request%cycle = .false.
+      report%iterations = iterations
+      report%residual = state%residual
+      ! A state of the march is judged as any point is.
+      report%converged = is_lasting(system%vibration) .and. &
+                         state%residual <= self%allowed_residual()
+      call self%about%describe(self%case, request, self%case%harmonics%n_harmonics, &
+                               system%vibration, state%x(:n), report, served_by_none, point, error)
+      if (allocated(error)) return
       point%cycles = state%cycles
       point%depth = state%x(n + 1:)
       point%wear_rate = state%rate
       point%wear_volume = patch_volumes(self%case%contact, point%depth)
-      point%iterations = iterations
-      point%residual = state%residual
-      ! A state of the march is judged as any point is.
-      point%converged = is_lasting(system%vibration)
-      point%converged = point%converged .and. state%residual <= self%allowed_residual()
-      call recover_point(system%vibration, state%x(:n), self%case%harmonics%n_harmonics, &
-                         .true., point)
       call add_energy(self, state, point%dissipation)
       point%wear_energy = self%energy
       if (.not. self%case%output%contact) then
@@ -87,22 +86,16 @@ contains
       ! The pairs that slip before anything is worn.
       if (self%n_rows == 0) call self%finer%look(self%case, march, system, state, &
                                                  state%rate > 0.0_wp)
-      if (self%case%output%histories) then
-         call recover_histories(system%vibration, size(system%vibration%balance, 1), state%x(:n), &
-                                self%case%harmonics%n_harmonics, point)
-      end if
-      call system_clock(clock, rate)
-      point%seconds = real(clock - self%clock, wp)/real(rate, wp)
-      self%clock = clock
-      call self%restart_rows%append(self%writer%file, march, state%x(:n), point%converged, &
+      call self%about%note_seconds(point)
+      call self%restart_rows%append(self%run%writer%file, march, state%x(:n), point%converged, &
                                     self%finer%notes(), error)
       if (allocated(error)) return
-      call self%writer%add_point(point, error)
+      call self%run%writer%add_point(point, error)
       if (allocated(error)) return
       self%n_rows = self%n_rows + 1
       call self%count_point(point)
-      call self%observer%on_point(self%n_rows, 0, point)
-      go_on = .not. self%observer%stop_requested
+      call self%run%observer%on_point(self%n_rows, 0, point)
+      go_on = .not. self%run%observer%stop_requested
    end subroutine take
 
    !> Pairs begin to slip: only for want of harmonics?
@@ -130,15 +123,15 @@ contains
 
       found = .false.
       iterations = 0
-      request = new_request(self%case, system%vibration%frequency(), self%observer)
+      request = new_request(self%case, system%vibration%frequency(), self%run%observer)
       ! Of this point the solution alone is wanted.
       request%contact = .false.
       request%histories = .false.
       request%cycle = .false.
       call solver%start(self%case, self%case%harmonics, size(x))
-      call self%observer%limit_point(self%case%solver%max_seconds)
+      call self%run%observer%limit_point(self%case%solver%max_seconds)
       call solver%solve(self%case, system%vibration, request, point, error)
-      call self%observer%limit_point(0.0_wp)
+      call self%run%observer%limit_point(0.0_wp)
       if (allocated(error)) then
          ! That the run was stopped the march sees itself.
          if (error%status == status_stopped) deallocate (error)
@@ -193,10 +186,10 @@ contains
       type(point_type), intent(in) :: point
 
       if (self%case%wear%scheme == wear_pseudo_time .and. .not. point%converged) then
-         call self%summary%add_transient(point)
+         call self%run%summary%add_transient(point)
       else
-         call self%summary%add(point)
-         call self%state%note(point)
+         call self%run%summary%add(point)
+         call self%run%state%note(point)
       end if
    end subroutine count_point
 

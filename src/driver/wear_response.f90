@@ -1,9 +1,10 @@
 !> Analysis 'wear': the joint wears over the cycles at the first frequency of the sweep.
 module fw_wear_response
    use fw_combinations, only: is_linear_euler
+   use fw_analysis, only: analysis, run_type
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
-   use fw_error, only: error_type, status_stopped
+   use fw_error, only: error_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
@@ -16,8 +17,6 @@ module fw_wear_response
    use fw_resonance, only: resonance_type
    use fw_restart_file, only: restart_type
    use fw_restart_rows, only: c_noted
-   use fw_result, only: result_writer
-   use fw_run_state, only: run_state
    use fw_strategy, only: new_request, note_time_limit
    use fw_summary, only: summary_type
    use fw_text, only: to_text
@@ -31,7 +30,7 @@ module fw_wear_response
    implicit none (type, external)
    private
 
-   public :: run_wear
+   public :: wear_analysis
 
    !> Largest growth of the depth in a step where the scheme estimates no error and the case names
    !> none, as a part of the depth scale.
@@ -51,8 +50,8 @@ module fw_wear_response
       procedure :: find => find_by_recorder
    end type silent_observer
 
-   !> Everything between the start of a run and its end.
-   type :: wear_run
+   type, extends(analysis) :: wear_analysis
+      private
       !> The vibration at fixed depths, and vibration and depth as one system over it.
       type(balance_problem) :: problem
       type(balance_state) :: balance
@@ -63,199 +62,200 @@ module fw_wear_response
       !> Where the run stands, and where it started.
       type(wear_state) :: state, first
       real(wp) :: first_omega = 0.0_wp
-   end type wear_run
+   contains
+      procedure :: start
+      procedure :: next
+      procedure :: conclude
+   end type wear_analysis
 
 contains
 
-   !> The vibration of the unworn joint, then the march; every accepted step is written as soon as
-   !> it is known.
-   subroutine run_wear(case, restart, observer, writer, summary, state, error)
+   subroutine start(self, case, run, error)
+      class(wear_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case
-      !> The run to be continued; without steps where there is none.
-      type(restart_type), intent(in) :: restart
-      class(observer_type), intent(inout), target :: observer
-      type(result_writer), intent(inout), target :: writer
-      type(summary_type), intent(inout), target :: summary
-      type(run_state), intent(inout), target :: state
+      type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
-      type(wear_run), target :: run
-      type(point_type) :: point
 
-      call build_system(case, run%problem, run%balance, error, held=run%recorder%finer%held)
-      if (.not. allocated(error)) then
-         call start_recorder(run%recorder, case, observer, writer, summary, state, error)
-      end if
+      call build_system(case, self%problem, self%balance, error, held=self%recorder%finer%held)
+      if (.not. allocated(error)) call start_recorder(self%recorder, case, run, error)
       if (allocated(error)) return
-      call observer%on_start(case%title, 0)
-      call run%solver%start(case, case%harmonics, run%balance%n)
+      call run%begin_points(case, self, 0)
+      call self%solver%start(case, case%harmonics, self%balance%n)
+   end subroutine start
+
+   !> The vibration of the unworn joint, then the march, which hands its rows on by itself: every
+   !> accepted step is written as soon as it is known.
+   subroutine next(self, case, observer, point, more, error)
+      class(wear_analysis), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(point_type), intent(out) :: point
+      logical, intent(out) :: more
+      type(error_type), allocatable, intent(out) :: error
+
+      more = .not. allocated(self%march%ending)
+      if (.not. more) return
       call observer%limit_point(case%solver%max_seconds)
-      call run%solver%solve(case, run%balance, new_request(case, case%sweep%start, observer), &
-                            point, error)
-      if (allocated(error)) then
-         call give_up_early(state, error)
-         call observer%on_end()
-         return
-      end if
+      call self%solver%solve(case, self%balance, new_request(case, case%sweep%start, observer), &
+                             point, error)
+      if (allocated(error)) return
       if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
       call observer%limit_point(0.0_wp)
       if (allocated(point%note)) call observer%on_message(point%note)
-      call remark_undetermined(run%solver%method%undetermined, summary%remarks)
-      if (point%converged) then
-         call start_march(run, case, point, error)
-         if (.not. allocated(error)) call march_on(run, restart, error)
+      call remark_undetermined(self%solver%method%undetermined, &
+                               self%recorder%run%summary%remarks)
+      more = .not. point%converged
+      if (more) then
+         ! A row marked as not converged, so that the result is not empty.
+         call give_up_unworn(self)
       else
-         call give_up_unworn(run, point, error)
+         call start_march(self, case, point, error)
+         if (.not. allocated(error)) call march_on(self, self%recorder%run%restart, error)
+         call self%recorder%restart_rows%close()
       end if
-      call observer%on_end()
-      if (.not. allocated(error)) call report_end(run, restart, error)
-      if (.not. allocated(error) .and. case%wear%check_steps .and. point%converged) then
+      self%falls_short = .not. self%march%complete
+   end subroutine next
+
+   subroutine conclude(self, case, run, error)
+      class(wear_analysis), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(out) :: error
+
+      ! A stop before the first state leaves nothing to tell.
+      if (.not. allocated(self%march%ending)) return
+      call report_end(self, run%restart, error)
+      if (.not. allocated(error) .and. case%wear%check_steps .and. allocated(self%first%x)) then
          ! Last, because it uses the system of the run for itself.
-         call compare_halved(run%recorder, run%system, run%march, run%first, run%first_omega, &
-                              run%state, error)
+         call compare_halved(self%recorder, self%system, self%march, self%first, &
+                             self%first_omega, self%state, error)
       end if
-      call run%recorder%restart_rows%close()
-   end subroutine run_wear
-
-   !> A stop before the first state is an outcome, and no error.
-   subroutine give_up_early(state, error)
-      type(run_state), intent(inout) :: state
-      type(error_type), allocatable, intent(inout) :: error
-
-      if (error%status /= status_stopped) return
-      deallocate (error)
-      state%was_stopped = .true.
-      state%is_incomplete = .true.
-   end subroutine give_up_early
+   end subroutine conclude
 
    !> The rows of a result that is incomplete until the run says otherwise.
-   subroutine start_recorder(recorder, case, observer, writer, summary, state, error)
+   subroutine start_recorder(recorder, case, run, error)
       type(wear_recorder), intent(inout) :: recorder
       type(case_type), intent(in), target :: case
-      class(observer_type), intent(inout), target :: observer
-      type(result_writer), intent(inout), target :: writer
-      type(summary_type), intent(inout), target :: summary
-      type(run_state), intent(inout), target :: state
+      type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
       type(wear_patches) :: patches
       type(wear_outcome) :: outcome
 
       recorder%case => case
-      recorder%state => state
-      recorder%observer => observer
-      recorder%writer => writer
-      recorder%summary => summary
-      call system_clock(recorder%clock)
+      recorder%run => run
+      call recorder%about%start_clock()
       patches%contact => case%contact
       patches%cycles_units = cycles_units(case)
-      call writer%add(patches, error)
+      call run%writer%add(patches, error)
       outcome%steady_state = trim(steady_words(steady_not_reached))
       outcome%ending = 'incomplete'
-      if (.not. allocated(error)) call writer%add(outcome, error)
+      if (.not. allocated(error)) call run%writer%add(outcome, error)
    end subroutine start_recorder
 
    !> From the vibration of the unworn joint, at its resonance where that is to be followed.
-   subroutine start_march(run, case, point, error)
-      type(wear_run), intent(inout), target :: run
+   subroutine start_march(self, case, point, error)
+      class(wear_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
 
-      call new_wear_system(run%balance, case%contact, case%wear%coefficient, &
-                           case%wear%law == wear_energy, run%system)
-      run%balance%interrupt => run%recorder%observer
-      run%system%interrupt => run%recorder%observer
-      call first_state(run%system, run%solver%x, point, run%state)
-      associate (march => run%march)
+      call new_wear_system(self%balance, case%contact, case%wear%coefficient, &
+                           case%wear%law == wear_energy, self%system)
+      self%balance%interrupt => self%recorder%run%observer
+      self%system%interrupt => self%recorder%run%observer
+      call first_state(self%system, self%solver%x, point, self%state)
+      associate (march => self%march)
          march%options = case%wear
          if (needs_depth_step(case)) then
-            march%options%max_depth_step = depth_step*run%system%depth_scale()
+            march%options%max_depth_step = depth_step*self%system%depth_scale()
             march%options%relative_step = relative_step
          end if
          march%stepper = new_wear_stepper(march%options, case%pseudo_time%scheme, &
-                                          run%solver%method%newton)
+                                          self%solver%method%newton)
          ! Also where it is not followed: the march has no case for its absence.
          march%resonance = resonance_type(n_harmonics=case%harmonics%n_harmonics, &
                                           first=case%sweep%start)
          if (case%wear%follow_resonance) then
-            call march%resonance%follow(march%stepper, run%system, run%state, point%iterations, &
+            call march%resonance%follow(march%stepper, self%system, self%state, point%iterations, &
                                          error)
          end if
       end associate
       ! Where check_steps starts once more.
-      run%first = run%state
-      run%first_omega = run%system%vibration%frequency()
+      self%first = self%state
+      self%first_omega = self%system%vibration%frequency()
    end subroutine start_march
 
    !> The march to its end, and why it ended.
-   subroutine march_on(run, restart, error)
-      type(wear_run), intent(inout), target :: run
+   subroutine march_on(self, restart, error)
+      class(wear_analysis), intent(inout), target :: self
       type(restart_type), intent(in) :: restart
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: reason
 
-      associate (recorder => run%recorder)
-         call recorder%restart_rows%create(recorder%writer%file, recorder%case%contact, &
-                                           run%system%n_vibration(), error)
+      associate (recorder => self%recorder)
+         call recorder%restart_rows%create(recorder%run%writer%file, recorder%case%contact, &
+                                           self%system%n_vibration(), error)
          if (allocated(error)) return
          if (restart%n_rows > 0) then
-            call resume(restart, recorder, run%system, run%march, run%state, error)
+            call resume(restart, recorder, self%system, self%march, self%state, error)
          end if
          if (allocated(error)) return
-         call run%march%run(run%system, run%state, recorder, error, resumed=restart%n_rows > 0)
+         call self%march%run(self%system, self%state, recorder, error, resumed=restart%n_rows > 0)
       end associate
-      if (allocated(error) .or. .not. run%march%gave_up) return
+      if (allocated(error) .or. .not. self%march%gave_up) return
       ! The failure is one at these depths.
-      run%balance%depth = run%state%x(run%system%n_vibration() + 1:)
-      call explain_failure(run%balance, run%solver%method, reason)
-      run%march%ending = run%march%ending//': '//reason
+      self%balance%depth = self%state%x(self%system%n_vibration() + 1:)
+      call explain_failure(self%balance, self%solver%method, reason)
+      self%march%ending = self%march%ending//': '//reason
    end subroutine march_on
 
    !> The result of a joint whose vibration was not found.
-   subroutine give_up_unworn(run, point, error)
-      type(wear_run), intent(inout) :: run
-      type(point_type), intent(in) :: point
-      type(error_type), allocatable, intent(out) :: error
+   subroutine give_up_unworn(self)
+      class(wear_analysis), intent(inout) :: self
       character(:), allocatable :: reason
 
-      call explain_failure(run%balance, run%solver%method, reason)
-      run%march%options = run%recorder%case%wear
-      run%march%ending = 'nothing was worn: '//reason
-      ! A row marked as not converged, so that the result is not empty.
-      call run%recorder%writer%add_point(point, error)
-      call run%recorder%summary%add(point)
-      call run%recorder%state%note(point)
-      call run%recorder%observer%on_point(1, 0, point)
+      call explain_failure(self%balance, self%solver%method, reason)
+      self%march%options = self%recorder%case%wear
+      self%march%ending = 'nothing was worn: '//reason
    end subroutine give_up_unworn
 
    !> How the run ended: to the observer, the summary and the result.
-   subroutine report_end(run, restart, error)
-      type(wear_run), intent(inout) :: run
+   subroutine report_end(self, restart, error)
+      class(wear_analysis), intent(inout) :: self
       type(restart_type), intent(in) :: restart
       type(error_type), allocatable, intent(out) :: error
       type(wear_outcome) :: outcome
+      character(40) :: text
 
-      associate (march => run%march, recorder => run%recorder, summary => run%recorder%summary)
-         call recorder%observer%on_message('wear: '//march%ending)
-         if (.not. march%complete) recorder%state%is_incomplete = .true.
-         recorder%state%was_stopped = recorder%observer%stop_requested
-         call summary%describe_work(run%balance, march%stepper%newton%linear, &
+      associate (march => self%march, recorder => self%recorder, &
+                 summary => self%recorder%run%summary)
+         call recorder%run%observer%on_message('wear: '//march%ending)
+         call summary%describe_work(self%balance, march%stepper%newton%linear, &
                                     recorder%case%solver%kind, &
-                                    recorder%state%all_converged())
-         call summary%describe_wear(trim(steady_words(march%steady)), march%n_steps, &
-                                    march%n_rejected, run%state%cycles, &
-                                    depth_of(run%system, run%state), &
-                                    [march%n_implicit, march%n_leaps])
-         if (restart%n_rows > 0) call summary%note_restart(restart%n_rows, restart%path)
-         if (.not. march%gave_up .and. allocated(run%state%x)) then
-            call recorder%finer%look_at_end(recorder%case, march, run%system, run%state)
+                                    recorder%run%state%all_converged())
+         write (text, '(es13.6, a, es13.6)') depth_of(self%system, self%state), ' after ', &
+            self%state%cycles
+         call summary%line('steady state', trim(steady_words(march%steady)))
+         call summary%line('largest depth', trim(adjustl(text))//' cycles')
+         call summary%line('wear steps', to_text(march%n_steps)//', '// &
+                           to_text(march%n_rejected)//' repeated')
+         if (march%n_implicit > 0) call summary%line('', to_text(march%n_implicit)// &
+                                                     ' of them implicit')
+         if (march%n_leaps > 0) call summary%line('', to_text(march%n_leaps)// &
+                                                  ' of them over what no other step passes')
+         if (restart%n_rows > 0) call summary%line('continued', 'after '// &
+                                                   to_text(restart%n_rows)//' rows of '// &
+                                                   restart%path)
+         if (.not. march%gave_up .and. allocated(self%state%x)) then
+            call recorder%finer%look_at_end(recorder%case, march, self%system, self%state)
          end if
          call recorder%finer%remark(recorder%case, summary)
-         call remark_steps(recorder%case, march, depth_of(run%system, run%state), summary)
+         call remark_steps(recorder%case, march, depth_of(self%system, self%state), summary)
          call recorder%finer%finish()
          outcome%steady_state = trim(steady_words(march%steady))
          outcome%ending = march%ending
          outcome%counts = [march%n_implicit, march%n_leaps, march%n_jumps]
-         call recorder%writer%add(outcome, error)
+         call recorder%run%writer%add(outcome, error)
       end associate
    end subroutine report_end
 
@@ -334,13 +334,13 @@ contains
       type(error_type), allocatable :: ignored
 
       ! No file is written: nothing to copy.
-      if (recorder%writer%file%id < 0) return
+      if (recorder%run%writer%file%id < 0) return
       !$omp critical (fretwear_io)
       call source%open_read(restart%path, error)
       !$omp end critical (fretwear_io)
-      associate (file => recorder%writer%file, n => restart%n_rows)
+      associate (file => recorder%run%writer%file, n => restart%n_rows)
          if (.not. allocated(error)) call recorder%restart_rows%copy(file, source, n, error)
-         if (.not. allocated(error)) call recorder%writer%copy_points(source, n, error)
+         if (.not. allocated(error)) call recorder%run%writer%copy_points(source, n, error)
       end associate
       !$omp critical (fretwear_io)
       call source%close(ignored)
@@ -362,10 +362,11 @@ contains
       type(wear_state) :: end_state
       type(wear_halved) :: profile
       real(wp) :: change
+      character(16) :: text
       integer :: n
 
       if (.not. march%complete) then
-         call recorder%observer%on_message('check_steps: left out, because the run did not '// &
+         call recorder%run%observer%on_message('check_steps: left out, because the run did not '// &
                                            'come to its end')
          return
       end if
@@ -385,19 +386,21 @@ contains
       call halved%run(system, end_state, silent, error)
       if (allocated(error)) return
       if (.not. halved%complete .or. halved%steady /= march%steady) then
-         call recorder%observer%on_message('check_steps: steps of half the size end otherwise: '// &
-                                           halved%ending)
+         call recorder%run%observer%on_message('check_steps: steps of half the size end '// &
+                                               'otherwise: '//halved%ending)
       end if
       if (.not. halved%complete) return
       change = maxval(abs(end_state%x(n + 1:) - state%x(n + 1:)))
       if (change > 0.0_wp) change = change/max(maxval(state%x(n + 1:)), tiny(1.0_wp))
-      call recorder%summary%note_profile_change(change, halved%n_steps)
-      if (change > large_change) call recorder%summary%remarks%add('profile depends on steps', &
+      write (text, '(es9.2)') change
+      call recorder%run%summary%line('steps halved', 'profile moves by '//trim(adjustl(text))// &
+                                     ' of the largest depth ('//to_text(halved%n_steps)//' steps)')
+      if (change > large_change) call recorder%run%summary%remarks%add('profile depends on steps', &
          'steps of half the size move the worn profile by '//to_text(100.0_wp*change)// &
          ' % of its largest depth')
       profile%depth = end_state%x(n + 1:)
       profile%change = change
-      call recorder%writer%add(profile, error)
+      call recorder%run%writer%add(profile, error)
    end subroutine compare_halved
 
    !> Nothing is kept of the states on the way.

@@ -46,6 +46,31 @@ def test_load_moves_to_the_pair_that_sticks(tmp_path):
     assert -found["contact/force"][-1, 0, :, 2] == pytest.approx([0.0, p["P"]], abs=1e-5)
 
 
+def test_stability_of_worn_rows(tmp_path):
+    """The multipliers of a row are those of a point with a gap of its depth."""
+    groups = {
+        "case": {"analysis": "wear"}, "model": {
+            "n_dof": 2, "mass": [1.0, 0.0, 0.0, 0.0], "stiffness": [1.0, 0.0, 0.0, 2.0],
+            "damping": [0.1, 0.0, 0.0, 0.0]},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 2], "mu": 0.5, "area": 1.0,
+                    "tangential_stiffness": 1.0, "normal_stiffness": 10.0},
+        "load": {"static": [0.0, -1.0], "cosine": [1.0, 0.0]},
+        "harmonics": {"n_harmonics": 5, "n_time": 512}, "sweep": {"start": 0.9, "stability": True},
+        "wear": {"coefficient": 1e-3, "n_cycles": 10, "max_depth_step": 0.02}}
+    run(tmp_path, groups)
+    worn = read(tmp_path / "case.h5")
+    assert (worn["floquet/stable"] == 1).all()
+    for row in (0, -1):
+        point = merged(groups, {"case": {"analysis": "point"}, "contact": {
+            "gap": worn["wear/depth"][row, 0]}})
+        del point["wear"]
+        run(tmp_path, point, name="own")
+        own = read(tmp_path / "own.h5")
+        # Tolerances of 1e-8 of the balances.
+        assert worn["floquet/multipliers"][row] == pytest.approx(
+            own["floquet/multipliers"][0], abs=1e-6)
+
+
 # Depth steps that give 8, 15 and 29 steps to 100 cycles; the 4th order is at round-off then.
 DEPTH_STEPS = [0.01, 0.005, 0.0025]
 COARSE = [0.02, 0.01]

@@ -94,6 +94,26 @@ def test_branches_of_given_amplitudes(tmp_path):
             == pytest.approx(slope, abs=1e-4 * np.abs(slope).max()))
 
 
+def test_direction_of_a_branch_over_a_parameter(tmp_path):
+    """Of given amplitude over the stiffness of the spring: the closed form's own slope."""
+    run(tmp_path, merged(DUFFING, {
+        "harmonics": {"n_harmonics": 1}, "sweep": {
+            "values": None, "parameter": "spring%coefficient", "frequency": 1.1, "start": 0.2,
+            "end": 1.0, "n_points": 9, "continuation": "arclength"}}))
+    found = read(tmp_path / "case.h5")
+    alpha = found["parameter"]
+
+    def cosine(at):
+        d = 1.0 - 1.1**2 + 0.75 * at
+        return d / np.hypot(d, 0.05 * 1.1)
+
+    slope = (cosine(alpha + 1e-6) - cosine(alpha - 1e-6)) / 2e-6
+    assert found["coefficients"][:, 1, 0] == pytest.approx(cosine(alpha), abs=1e-7)
+    assert (found["tangent/coefficients"][:, 1, 0] / found["tangent/parameter"]
+            == pytest.approx(slope, abs=1e-4 * np.abs(slope).max()))
+    assert "tangent/omega" not in found
+
+
 def test_a_branch_through_folds_of_an_internal_resonance(tmp_path):
     """Where the third harmonic meets another mode a given amplitude has three loads: natural steps
     jump there. Their points are those of the branch, and of runs under the loads found."""

@@ -3,6 +3,7 @@ added to a copy of the tree, compiled, run, and the old files that it touched ar
 
 A file of its own is free; a limit may only fall.
 """
+import os
 import re
 import shutil
 import subprocess
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 from project import ROOT
 
+#: Calls between the command and Newton's method, the one of the run included.
+CALLS = 6
 #: Old files that each may touch.
 LIMITS = {"law": 1, "quantity": 1, "rule": 1, "analysis": 2, "part": 2, "parameter": 1}
 
@@ -79,14 +82,19 @@ def add_analysis(toy):
     toy.new("src/driver/run_toy.f90", """\
 !> Runs analysis 'toy'.
 module fw_run_toy
+   use fw_analysis, only: analysis, run_type
    use fw_case, only: case_type
    use fw_error, only: error_type
-   use fw_result, only: result_writer
    use fw_result_group, only: group_writer, result_group
    implicit none (type, external)
    private
 
-   public :: run_toy
+   public :: toy_analysis
+
+   type, extends(analysis) :: toy_analysis
+   contains
+      procedure :: start
+   end type toy_analysis
 
    type, extends(result_group) :: toy_group
       integer :: n_pairs = 0
@@ -96,15 +104,16 @@ module fw_run_toy
 
 contains
 
-   subroutine run_toy(case, writer, error)
-      type(case_type), intent(in) :: case
-      type(result_writer), intent(inout) :: writer
+   subroutine start(self, case, run, error)
+      class(toy_analysis), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
       type(toy_group) :: group
 
       group%n_pairs = case%contact%n_pairs
-      call writer%add(group, error)
-   end subroutine run_toy
+      call run%writer%add(group, error)
+   end subroutine start
 
    subroutine write_toy(self, to)
       class(toy_group), intent(in) :: self
@@ -125,13 +134,32 @@ end module fw_run_toy
                 "      analysis_facts(is_resonance=.true., finds_frequency=.true.), &\n"
                 "      analysis_facts(has_points=.false., is_balanced=.false.)]"))
     toy.change("src/driver/run.f90",
-               ("   use fw_run_state,", "   use fw_run_toy, only: run_toy\n   use fw_run_state,"),
-               ("analysis_resonance, analysis_wear, case_type",
-                "analysis_resonance, analysis_toy, &\n      analysis_wear, case_type"),
-               ("      else if (case%analysis == analysis_mode) then\n         call run_mode(",
-                "      else if (case%analysis == analysis_toy) then\n"
-                "         call run_toy(case, writer, error)\n"
-                "      else if (case%analysis == analysis_mode) then\n         call run_mode("))
+               ("   use fw_run_state,",
+                "   use fw_run_toy, only: toy_analysis\n   use fw_run_state,"),
+               ("analysis_resonance, analysis_wear, &",
+                "analysis_resonance, analysis_toy, analysis_wear, &"),
+               ("      case (analysis_mode);",
+                "      case (analysis_toy); allocate (toy_analysis :: work)\n"
+                "      case (analysis_mode);"))
+
+
+def add_frames(tree):
+    """Newton's method prints who called it, where the environment asks for that."""
+    path = tree / "src/solve/newton.f90"
+    text = path.read_text()
+    start = text.index("   subroutine solve(self")
+    call = text.index("\n\n", start)
+    path.write_text(text[:call] + """
+      character(1) :: asked
+      integer :: length
+
+      interface
+         subroutine print_callers() bind(c, name='_gfortran_backtrace')
+         end subroutine print_callers
+      end interface
+
+      call get_environment_variable('SHOW_CALLERS', asked, length)
+      if (length > 0) call print_callers()""" + text[call:])
 
 
 def add_part(toy):
@@ -173,8 +201,9 @@ def build_toys(tmp_path_factory):
         toy = Toy(tree)
         add(toy)
         touched[name] = toy.touched
-    options = ["-DCMAKE_Fortran_FLAGS_RELEASE=-O0", "-DFRETWEAR_TESTS=OFF", "-DFRETWEAR_PYTHON=OFF",
-               "-DFRETWEAR_SHARED=OFF"]
+    add_frames(tree)
+    options = ["-DCMAKE_Fortran_FLAGS_RELEASE=-O0 -g -fno-inline", "-DFRETWEAR_TESTS=OFF",
+               "-DFRETWEAR_PYTHON=OFF", "-DFRETWEAR_SHARED=OFF"]
     for command in (["cmake", "-S", tree, "-B", tree / "build", "-G", "Ninja", *options],
                     ["cmake", "--build", tree / "build", "--target", "fw_run"]):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -298,3 +327,12 @@ def test_parameter_has_no_slope(built, tmp_path):
     done = run(built[0], tmp_path, "slope", RUBBING.format(law="regularised", more=more))
     assert done.returncode == 3
     assert "contact%slip_speed': its derivative is not known" in done.stderr
+def test_calls_before_newton(built, tmp_path):
+    """Who reads the sources from `run_case` on comes to Newton's method soon."""
+    (tmp_path / "case.nml").write_text(RUBBING.format(law="regularised", more=""))
+    done = subprocess.run([built[0], "case.nml"], cwd=tmp_path, capture_output=True, text=True,
+                          check=True, env={**os.environ, "SHOW_CALLERS": "yes"})
+    first = done.stderr[:done.stderr.index("run_case")]
+    names = re.findall(r"^#\d+ .* in __fw_(\w+)", first + "run_case", re.MULTILINE)
+    assert names[0].startswith("newton")
+    assert len(names[1:]) <= CALLS, names
