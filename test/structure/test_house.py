@@ -13,14 +13,14 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (85400, 1000),
-    "files of src": (392, 10),
+    "lines of src": (86200, 1000),
+    "files of src": (397, 10),
     "lines of the longest file": (778, 50),
     "modules used by one file, at most": (33, 2),
-    "files that name forces%pairs": (43, 0),
+    "files that name forces%pairs": (44, 0),
     "files that name case_type": (61, 0),
     "files that name an analysis": (5, 0),
-    "files with select type": (16, 0),
+    "files with select type": (17, 0),
 }
 
 
