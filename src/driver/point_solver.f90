@@ -8,6 +8,7 @@ module fw_point_solver
    use fw_contact_data, only: memory_carried
    use fw_cycle_recovery, only: recover_cycle
    use fw_error, only: error_type
+   use fw_failed_starts, only: failed_starts
    use fw_guess, only: free_guess, stuck_guess
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_state, only: balance_state
@@ -54,6 +55,9 @@ module fw_point_solver
    integer, parameter :: raising_work = 50
    !> First and smallest step of the load on the way to a first solution.
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
+   !> Ways from a start that are not gone twice: the solver of the case, with LU after GMRES, and
+   !> pseudo-time.
+   integer, parameter :: way_solver = 1, way_lu = 2, way_flow = 3
 
    type :: point_solver
       !> The solver of the case, and pseudo-time where it fails.
@@ -76,6 +80,14 @@ module fw_point_solver
       !> Iterations of a point from which on no other way is begun, and whether that was so.
       integer :: work_limit = huge(1)
       logical :: out_of_work = .false.
+      !> The same that the request allows at the most, raising the load included.
+      integer, private :: most_allowed = huge(1)
+      !> Friction of the present point was ripple in a solution of the solver, or of any way. Then
+      !> smaller steps, LU and the free guess came to no other one (0 of 180 such points of dlft on
+      !> masses), and other balances neither where the solver had found it (0 of 140).
+      logical :: found_ripple = .false., ripples = .false.
+      !> Where the present point was started from in vain.
+      type(failed_starts), private :: failed
       !> What gave the present solution.
       integer :: served_by = served_by_none
    contains
@@ -114,9 +126,13 @@ contains
       call system_clock(clock, rate)
       self%omega_wanted = request%place()
       self%best_residual = huge(1.0_wp)
+      self%most_allowed = request%most_work
       self%work_limit = min(request%most_work, &
                             most_work*max(case%solver%max_iterations, least_counted))
       self%out_of_work = .false.
+      if (.not. request%again) call self%failed%clear()
+      self%found_ripple = .false.
+      self%ripples = .false.
       system%interrupt => request%interrupt
       if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)
       if (allocated(error)) return
@@ -216,6 +232,7 @@ contains
          if (allocated(error)) return
          if (.not. goes_on(self, report, iterations)) return
       end if
+      if (self%ripples) return
       if (self%method%newton%linear%lu_left_out) then
          self%method%newton%linear%lu_follows = .true.
          call from_guesses(self, system, request%place(), report, iterations, error)
@@ -238,6 +255,7 @@ contains
 
       ! The flow forms and factors matrices of all coordinates for every step: with many of them the
       ! load is raised first, where there is no point to come from.
+      if (self%ripples .and. size(self%x) > flow_first_up_to) return
       if (self%known%kept == 0 .and. size(self%x) > flow_first_up_to) then
          call raise_load(self, system, omega, report, iterations, error)
          if (allocated(error)) return
@@ -246,7 +264,8 @@ contains
       end if
       ! No flow has been derived for the whole of cyclic structures.
       if (self%flow_failures < max_flow_failures .and. .not. case%model%cyclic%is_cyclic) then
-         if (self%known%kept > 0 .and. size(self%x) > steps_first_from) then
+         if (self%known%kept > 0 .and. size(self%x) > steps_first_from .and. &
+             .not. self%ripples) then
             call approach(self, system, omega, max_halvings - 1, report, iterations, error)
             if (allocated(error)) return
             if (report%converged) self%served_by = served_by_smaller_steps
@@ -259,6 +278,7 @@ contains
          if (report%converged) self%n_by_flow = self%n_by_flow + 1
          if (.not. goes_on(self, report, iterations)) return
       end if
+      if (self%ripples) return
       if (self%known%kept == 0) then
          if (size(self%x) > flow_first_up_to) return
          call raise_load(self, system, omega, report, iterations, error)
@@ -298,6 +318,7 @@ contains
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: start(:)
 
       call system%set_parameter(omega, error)
       if (allocated(error)) return
@@ -306,13 +327,19 @@ contains
       else
          call stuck_guess(system, self%x)
       end if
+      if (self%failed%hold(way_flow, omega, system%load_share, self%x)) return
+      start = self%x
       call self%method%solve_by_flow(case, pseudo, system, self%x, report, error)
       if (allocated(error)) return
+      if (.not. (report%converged .or. report%interrupted)) then
+         call self%failed%add(way_flow, omega, system%load_share, start)
+      end if
       iterations = iterations + report%iterations
       if (report%converged) then
          self%served_by = served_by_pseudo_time
          call self%known%remember(omega, self%x)
       else
+         self%ripples = self%ripples .or. self%method%ripples
          call note_best(self, report)
       end if
    end subroutine by_flow
@@ -332,6 +359,7 @@ contains
       step = first_load_step
       self%work_limit = max(self%work_limit, iterations + raising_work* &
                             max(self%method%newton%options%max_iterations, least_counted))
+      self%work_limit = min(self%work_limit, self%most_allowed)
       ! The position at rest, from which the load is raised.
       system%load_share = 0.0_wp
       call system%set_parameter(omega, error)
@@ -353,7 +381,7 @@ contains
          else
             self%x = reached
             step = 0.5_wp*step
-            if (step < smallest_load_step) exit
+            if (step < smallest_load_step .or. self%ripples) exit
             if (.not. goes_on(self, report, iterations)) exit
          end if
       end do
@@ -470,16 +498,29 @@ contains
       end select
    end function first_choice
 
-   !> One solution from the guess in x; the best that fails at the point itself is noted.
+   !> One solution from the guess in x, unless that has failed before; the best that fails at the
+   !> point itself is noted.
    subroutine attempt(self, system, report)
       class(point_solver), intent(inout) :: self
       type(balance_state), intent(inout), target :: system
       type(solver_report), intent(out) :: report
+      real(wp), allocatable :: start(:)
+      integer :: way
 
-      call self%method%solve(system, self%x, report)
-      if (report%converged .or. system%load_share < 1.0_wp) return
+      way = merge(way_lu, way_solver, self%method%newton%linear%lu_follows)
+      associate (place => system%parameter(), share => system%load_share)
+         if (self%failed%hold(way, place, share, self%x)) return
+         start = self%x
+         call self%method%solve(system, self%x, report)
+         if (report%converged .or. report%interrupted) return
+         call self%failed%add(way, place, share, start)
+      end associate
+      if (system%load_share < 1.0_wp) return
       ! Intermediate frequencies and loads are no answer to what was asked.
-      if (abs(system%parameter() - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
+      if (abs(system%parameter() - self%omega_wanted) > 0.0_wp) return
+      self%found_ripple = self%found_ripple .or. self%method%ripples
+      self%ripples = self%ripples .or. self%method%ripples
+      call note_best(self, report)
    end subroutine attempt
 
    !> Keep the unknowns of the smallest residual; NaN is never smaller.

@@ -45,6 +45,8 @@ module fw_solution
       logical :: undetermined_again = .false.
       !> A solution was refused because its friction is ripple.
       logical :: rippled = .false.
+      !> The last one was.
+      logical :: ripples = .false.
       !> The system was evaluated last at the very solution that converged.
       logical :: stands = .false.
       !> Why the last pseudo-time solution failed.
@@ -84,6 +86,7 @@ contains
       class(parameter_system), pointer :: solved
       real(wp), allocatable :: unknowns(:)
 
+      self%ripples = .false.
       call formulation%begin(system)
       solved => formulation%as_solved()
       allocate (unknowns(system%n))
@@ -164,6 +167,7 @@ contains
       real(wp), allocatable :: whole_x(:)
 
       self%stands = .false.
+      self%ripples = .false.
       report%interrupted = system%is_interrupted()
       if (report%interrupted) return
       if (.not. allocated(self%whole)) then
@@ -214,6 +218,7 @@ contains
       if (.not. report%converged) return
       rippled = lacks_friction(system, x)
       self%rippled = self%rippled .or. rippled
+      self%ripples = rippled
       report%converged = .not. rippled
       if (n_idle > 0 .and. report%converged) then
          if (self%undetermined_at < 0.0_wp) self%undetermined_at = system%frequency()
