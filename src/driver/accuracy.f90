@@ -165,8 +165,9 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: best
-      !> Estimated errors of truncation and sampling.
-      real(wp) :: errors(2)
+      !> Estimated errors of truncation and sampling, and those of the best solution: a finer one
+      !> that fails tells nothing of either.
+      real(wp) :: errors(2), of_best(2)
       type(point_request) :: asked
       integer :: iterations, failures, first, at_best(2)
       integer(int64) :: clock, clock_end, rate
@@ -192,6 +193,7 @@ contains
             if (allocated(error)) return
             point%error_estimate = total(errors)
             best = point
+            of_best = errors
             at_best = [self%current, self%doublings]
             if (point%error_estimate <= case%harmonics%accuracy) exit
          else
@@ -217,7 +219,10 @@ contains
          ! The next point starts where this one did, or where it was solved.
          self%current = at_best(1)
          self%doublings = at_best(2)
-         if (best%converged) point = best
+         if (best%converged) then
+            point = best
+            errors = of_best
+         end if
       end if
       if (point%converged) call improve(self, case, request, at_best, point)
       point%iterations = iterations

@@ -101,16 +101,17 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: step
 
-      call below%solve(case, bare_request(request, fallback=.false.), step, error)
+      call below%solve(case, bare_request(request, work, fallback=.false.), step, error)
       if (allocated(error)) return
       work = work + step%iterations
       done = step%converged
       if (done) call arrive(case, below, level, request, point, work, done, error, deep=.false.)
    end subroutine from_below
 
-   !> What a balance on the way is asked for.
-   function bare_request(request, fallback) result(bare)
+   !> What a balance on the way is asked for, and the work that is left for it.
+   function bare_request(request, work, fallback) result(bare)
       type(point_request), intent(in) :: request
+      integer, intent(in) :: work
       logical, intent(in) :: fallback
       type(point_request) :: bare
 
@@ -119,6 +120,7 @@ contains
       bare%contact = .false.
       bare%histories = .false.
       bare%fallback = fallback
+      bare%most_work = min(request%most_work, most_work - work)
    end function bare_request
 
    !> Up the ladder of harmonics; steps between the last that has a solution and the wanted one are
@@ -144,6 +146,7 @@ contains
       done = .false.
       most = case%harmonics%n_harmonics
       ladder = harmonic_levels(most, case%model%waves%highest())
+      upper = most
       do k = 1, size(ladder) - 1
          if (work >= most_work) exit
          allocate (next)
@@ -152,11 +155,11 @@ contains
          if (done) then
             lower = ladder(k)
          else if (lower > 0) then
-            ! Higher levels start from this one.
+            ! Higher levels start from this one, which does not lead to this very one.
+            upper = ladder(k)
             exit
          end if
       end do
-      upper = most
       do while (lower > 0 .and. .not. allocated(error))
          call arrive(case, last, level, request, point, work, done, error)
          if (done .or. allocated(error) .or. work >= most_work) exit
@@ -234,7 +237,7 @@ contains
       call next%build(easier, n_harmonics, error)
       if (.not. allocated(error)) then
          if (associated(last)) call next%take_over(last)
-         call next%solve(easier, bare_request(request, fallback=.true.), point, error)
+         call next%solve(easier, bare_request(request, work, fallback=.true.), point, error)
       end if
       if (.not. allocated(error)) then
          work = work + point%iterations
@@ -310,6 +313,7 @@ contains
       done = .false.
       plain = request
       plain%fallback = .false.
+      plain%again = .true.
       call level%solve(case, plain, trial, error)
       if (allocated(error)) return
       work = work + trial%iterations
@@ -318,6 +322,7 @@ contains
       if (.not. trial%converged .and. goes_deep) then
          ! Pseudo-time flows on from here, where Newton's method has gone astray.
          plain%fallback = .true.
+         plain%most_work = min(request%most_work, most_work - work)
          level%solver%flow_failures = 0
          call level%solve(case, plain, trial, error)
          if (allocated(error)) return

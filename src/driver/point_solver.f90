@@ -7,6 +7,7 @@ module fw_point_solver
    use fw_contact_data, only: memory_carried
    use fw_describe, only: describer
    use fw_error, only: error_type
+   use fw_failed_starts, only: failed_starts
    use fw_guess, only: free_guess, stuck_guess
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_state, only: balance_state
@@ -49,6 +50,9 @@ module fw_point_solver
    integer, parameter :: raising_work = 50
    !> First and smallest step of the load on the way to a first solution.
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
+   !> Ways from a start that are not gone twice: the solver of the case, with LU after GMRES, and
+   !> pseudo-time.
+   integer, parameter :: way_solver = 1, way_lu = 2, way_flow = 3
 
    type :: point_solver
       !> The solver of the case, and pseudo-time where it fails.
@@ -72,6 +76,16 @@ module fw_point_solver
       logical :: out_of_work = .false.
       !> Options of the case: a point may ask for others.
       type(solver_options) :: options
+      !> The same that the request allows at the most, raising the load included.
+      integer, private :: most_allowed = huge(1)
+      !> Friction of the present point was ripple in a solution of the solver, or of any way. Then
+      !> smaller steps, LU and the free guess came to no other one (0 of 180 such points of dlft on
+      !> masses), and other balances neither where the solver had found it (0 of 140).
+      logical :: found_ripple = .false., ripples = .false.
+      !> Where the present point was started from in vain.
+      type(failed_starts), private :: failed
+      !> Where the present attempt starts.
+      real(wp), allocatable, private :: tried(:)
       !> What gave the present solution.
       integer :: served_by = served_by_none
    contains
@@ -155,9 +169,13 @@ contains
       call self%about%start_clock()
       self%omega_wanted = request%place()
       self%best_residual = huge(1.0_wp)
+      self%most_allowed = request%most_work
       self%work_limit = min(request%most_work, &
                             most_work*max(case%solver%max_iterations, least_counted))
       self%out_of_work = .false.
+      if (.not. request%again) call self%failed%clear()
+      self%found_ripple = .false.
+      self%ripples = .false.
       system%interrupt => request%interrupt
       if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)
       if (allocated(error)) return
@@ -218,6 +236,7 @@ contains
          if (allocated(error)) return
          if (.not. goes_on(self, report, iterations)) return
       end if
+      if (self%ripples) return
       if (self%method%newton%linear%lu_left_out) then
          self%method%newton%linear%lu_follows = .true.
          call from_guesses(self, system, omega, report, iterations, error)
@@ -240,6 +259,7 @@ contains
 
       ! The flow forms and factors matrices of all coordinates for every step: with many of them the
       ! load is raised first, where there is no point to come from.
+      if (self%ripples .and. size(self%x) > flow_first_up_to) return
       if (self%known%kept == 0 .and. size(self%x) > flow_first_up_to) then
          call raise_load(self, system, omega, report, iterations, error)
          if (allocated(error)) return
@@ -248,7 +268,8 @@ contains
       end if
       ! No flow has been derived for the whole of cyclic structures.
       if (self%flow_failures < max_flow_failures .and. .not. case%model%cyclic%is_cyclic) then
-         if (self%known%kept > 0 .and. size(self%x) > steps_first_from) then
+         if (self%known%kept > 0 .and. size(self%x) > steps_first_from .and. &
+             .not. self%ripples) then
             call approach(self, system, omega, max_halvings - 1, report, iterations, error)
             if (allocated(error)) return
             if (report%converged) self%served_by = served_by_smaller_steps
@@ -261,6 +282,7 @@ contains
          if (report%converged) self%n_by_flow = self%n_by_flow + 1
          if (.not. goes_on(self, report, iterations)) return
       end if
+      if (self%ripples) return
       if (self%known%kept == 0) then
          if (size(self%x) > flow_first_up_to) return
          call raise_load(self, system, omega, report, iterations, error)
@@ -281,8 +303,10 @@ contains
       type(solver_report) :: last_report
 
       call free_guess(system, self%x)
-      call self%method%solve(system, self%x, last_report)
-      call note_best(self, system, last_report)
+      if (is_new(self, system, last_report)) then
+         call self%method%solve(system, self%x, last_report)
+         call note_attempt(self, system, last_report)
+      end if
       iterations = iterations + last_report%iterations
       report%interrupted = last_report%interrupted
       if (.not. last_report%converged) return
@@ -301,6 +325,7 @@ contains
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: start(:)
 
       call system%set_parameter(omega, error)
       if (allocated(error)) return
@@ -309,13 +334,19 @@ contains
       else
          call stuck_guess(system, self%x)
       end if
+      if (self%failed%hold(way_flow, omega, system%load_share, self%x)) return
+      start = self%x
       call self%method%solve_by_flow(case, pseudo, system, self%x, report, error)
       if (allocated(error)) return
+      if (.not. (report%converged .or. report%interrupted)) then
+         call self%failed%add(way_flow, omega, system%load_share, start)
+      end if
       iterations = iterations + report%iterations
       if (report%converged) then
          self%served_by = served_by_pseudo_time
          call self%known%remember(omega, self%x)
       else
+         self%ripples = self%ripples .or. self%method%ripples
          call note_best(self, system, report)
       end if
    end subroutine by_flow
@@ -335,6 +366,7 @@ contains
       step = first_load_step
       self%work_limit = max(self%work_limit, iterations + raising_work* &
                             max(self%method%newton%options%max_iterations, least_counted))
+      self%work_limit = min(self%work_limit, self%most_allowed)
       ! The position at rest, from which the load is raised.
       system%load_share = 0.0_wp
       call system%set_parameter(omega, error)
@@ -345,8 +377,10 @@ contains
          system%load_share = min(1.0_wp, share + step)
          call system%set_parameter(omega, error)
          if (allocated(error)) exit
-         call self%method%solve(system, self%x, report)
-         call note_best(self, system, report)
+         if (is_new(self, system, report)) then
+            call self%method%solve(system, self%x, report)
+            call note_attempt(self, system, report)
+         end if
          iterations = iterations + report%iterations
          if (report%converged) then
             reached = self%x
@@ -357,7 +391,7 @@ contains
          else
             self%x = reached
             step = 0.5_wp*step
-            if (step < smallest_load_step) exit
+            if (step < smallest_load_step .or. self%ripples) exit
             if (.not. goes_on(self, report, iterations)) exit
          end if
       end do
@@ -393,8 +427,10 @@ contains
          case default
             call stuck_guess(system, self%x)
          end select
-         call self%method%solve(system, self%x, report)
-         call note_best(self, system, report)
+         if (is_new(self, system, report)) then
+            call self%method%solve(system, self%x, report)
+            call note_attempt(self, system, report)
+         end if
          iterations = iterations + report%iterations
          if (report%converged .or. report%interrupted) exit
          if (.not. self%method%newton%options%fallback) exit
@@ -462,6 +498,40 @@ contains
          first_choice = served_by_newton
       end select
    end function first_choice
+
+   !> Whether the guess in x has not failed before in the way that is tried now.
+   logical function is_new(self, system, report)
+      class(point_solver), intent(inout) :: self
+      type(balance_state), intent(in) :: system
+      !> That of no solution.
+      type(solver_report), intent(out) :: report
+
+      is_new = .not. self%failed%hold(present_way(self), system%parameter(), system%load_share, &
+                                      self%x)
+      if (is_new) self%tried = self%x
+   end function is_new
+
+   pure integer function present_way(self) result(way)
+      class(point_solver), intent(in) :: self
+
+      way = merge(way_lu, way_solver, self%method%newton%linear%lu_follows)
+   end function present_way
+
+   !> What an attempt came to: the start that failed, and the best that fails at the
+   !> point itself.
+   subroutine note_attempt(self, system, report)
+      class(point_solver), intent(inout) :: self
+      type(balance_state), intent(in) :: system
+      type(solver_report), intent(in) :: report
+
+      if (report%converged .or. report%interrupted) return
+      call self%failed%add(present_way(self), system%parameter(), system%load_share, self%tried)
+      call note_best(self, system, report)
+      if (system%load_share < 1.0_wp) return
+      if (abs(system%parameter() - self%omega_wanted) > 0.0_wp) return
+      self%found_ripple = self%found_ripple .or. self%method%ripples
+      self%ripples = self%ripples .or. self%method%ripples
+   end subroutine note_attempt
 
    !> Keep the unknowns of the smallest residual, where they failed at the point itself:
    !> intermediate frequencies and loads are no answer to what was asked. NaN is never smaller.

@@ -69,7 +69,7 @@ contains
       type(solver_report) :: report
       type(bracket_type) :: bracket
       real(wp) :: ds, last
-      logical :: done
+      logical :: done, is_top
       integer :: k
 
       call solve_at(curve, guess, held, report, outcome, error)
@@ -90,7 +90,11 @@ contains
          if (bracket%is_closed() .and. (k > most_free .or. .not. is_smooth)) then
             call solve_at(curve, bracket%middle(), .false., report, outcome, error)
          else
-            call go(curve, ds, report, outcome, error)
+            call go(curve, ds, is_top, report, outcome, error)
+            if (allocated(error)) return
+            ! The same look would lead to the same steps again.
+            outcome%is_corner = is_top
+            if (is_top) exit
          end if
          if (allocated(error) .or. .not. report%converged) return
          if (curve%omega() < range(1) .or. curve%omega() > range(2)) then
@@ -160,20 +164,24 @@ contains
    end function step_of
 
    !> One step, halved until a solution is found that is not lower.
-   subroutine go(curve, ds, report, outcome, error)
+   subroutine go(curve, ds, is_top, report, outcome, error)
       type(response_curve), intent(inout) :: curve
       real(wp), intent(inout) :: ds
+      !> All is lower uphill of where it began, next to it too: a corner.
+      logical, intent(out) :: is_top
       type(solver_report), intent(out) :: report
       type(search_outcome), intent(inout) :: outcome
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: x(:), t(:), bend(:), guess(:)
       real(wp) :: value
+      logical :: is_near
       integer :: k
 
       x = curve%x
       t = curve%t
       bend = curve%bend
       value = curve%q%value
+      is_top = .false.
       do k = 0, most_halvings
          guess = x + ds*t
          ! The bend is worth taking where it is a correction.
@@ -181,16 +189,18 @@ contains
          call solve_at(curve, guess, .false., report, outcome, error)
          if (allocated(error)) return
          if (report%converged) then
-            if (curve%size_of(curve%x - x) <= 3.0_wp*abs(ds) .and. &
-                curve%value_at() >= (1.0_wp - round_off)*value) return
+            is_near = curve%size_of(curve%x - x) <= 3.0_wp*abs(ds)
+            if (is_near .and. curve%value_at() >= (1.0_wp - round_off)*value) return
+         else
+            is_near = .false.
          end if
          ds = 0.5_wp*ds
          report%converged = .false.
       end do
       ! Nothing higher beside it: as good as there.
-      if (abs(ds) <= near) then
-         call solve_at(curve, x, .false., report, outcome, error)
-      end if
+      if (abs(ds) > near .or. .not. is_near) return
+      call solve_at(curve, x, .false., report, outcome, error)
+      is_top = report%converged
    end subroutine go
 
    subroutine solve_at(curve, guess, held, report, outcome, error)

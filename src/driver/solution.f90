@@ -51,6 +51,8 @@ module fw_solution
       logical, private :: left_tolerance = .false.
       !> A solution was refused because its friction is ripple.
       logical :: rippled = .false.
+      !> The last one was.
+      logical :: ripples = .false.
       !> The system was evaluated last at the very solution that converged.
       logical :: stands = .false.
       !> Why the last pseudo-time solution failed.
@@ -111,6 +113,7 @@ contains
       integer :: iterations, trial
 
       iterations = 0
+      self%ripples = .false.
       call formulation%begin(system)
       given => formulation%as_solved()
       solved => given
@@ -177,6 +180,7 @@ contains
       real(wp), allocatable :: whole_x(:)
 
       self%stands = .false.
+      self%ripples = .false.
       report%interrupted = system%is_interrupted()
       if (report%interrupted) return
       if (.not. allocated(self%whole)) then
@@ -232,6 +236,7 @@ contains
       if (.not. report%converged) return
       rippled = lacks_friction(system, x)
       self%rippled = self%rippled .or. rippled
+      self%ripples = rippled
       report%converged = .not. rippled
       if (.not. report%converged) return
       do k = 1, size(idle)

@@ -27,6 +27,8 @@ module fw_strategy
       real(wp) :: amplitude = 0.0_wp
       !> Look for other ways where the first fails.
       logical :: fallback = .true.
+      !> The same point as before, of the same equations: starts that failed are not tried again.
+      logical :: again = .false.
       !> By Newton's method, whatever the case asks for: between solved points it needs a few steps.
       logical :: by_newton = .false.
       !> Floquet multipliers; contact forces, states and energies; histories over the period.
