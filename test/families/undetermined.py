@@ -25,6 +25,11 @@ that would make the matrix singular: *near* are those below 1e4. False is a rema
 that is not near. Missed is an undetermined motion without a remark. Wrong without a word is a
 motion that is off by 3 % of the largest displacement (undetermined ones with their mode at rest),
 or by more than the condition of the matrix explains.
+
+Not judged are motions above 30 with pairs, which slip there, and those of a part that rubs and is
+joined to the second one; of a regular motion the solver's tolerance may leave 3e-4. A mode that
+nothing couples counts as met within 1e-12 of its frequency or damping, 4500 epsilon: such a case
+(one of these, at 2250 epsilon) is among the near ones.
 """
 COUNT = 600
 SMALL = tuple(range(40))
