@@ -123,7 +123,7 @@ def _again(result: Result, point: int) -> Point:
     settings = _settings(result, point)
     if "contact%law" in values:
         # Left to the program, histories would ask for another one.
-        settings["contact"] = {"law": values["contact%law"][0], **settings.get("contact", {})}
+        settings["contact"] = {"law": _words(values), **settings.get("contact", {})}
     finer = {**settings, "harmonics": {**settings["harmonics"], "n_time": _INSTANTS}}
     # Located events are exact whatever the instants, in one tangential direction.
     by_events = result.attributes.get("sampling") == "events"
@@ -133,7 +133,7 @@ def _again(result: Result, point: int) -> Point:
     if is_sweep and point > _BEFORE:
         # Of several solutions the way from the first row leads to that of the row.
         tried.append((settings, 0))
-    if "error_estimate" in result and values.get("contact%law", ["dlft"])[0] in _RIGID_WORDS:
+    if "error_estimate" in result and _words(values, "dlft") in _RIGID_WORDS:
         # Under an accuracy, friction in one direction is solved as by the law of high order.
         rigid = {**finer, "contact": {**settings.get("contact", {}), "law": "rigid"}}
         tried.insert(0, (rigid, point))
@@ -147,6 +147,12 @@ def _again(result: Result, point: int) -> Point:
     if not is_sweep and "wear/depth" not in result:
         return _of_run(run_again(result), point)
     raise AbsentError(_excuse(result, point, "solving it again leads to another solution"))
+
+
+def _words(values: dict[str, list[str]], absent: str = "") -> str | list[str]:
+    """The law of all pairs, or that of each."""
+    words = values.get("contact%law", [absent])
+    return words if len(words) > 1 else words[0]
 
 
 def _of_run(known: Result, point: int) -> Point:
@@ -170,7 +176,7 @@ def run_again(result: Result) -> Result:
     values = namelist_values(result.namelist)
     # Left to the program, histories would ask for another law, and for instants.
     if "contact%law" in values:
-        groups["contact"] = {"law": values["contact%law"][0]}
+        groups["contact"] = {"law": _words(values)}
     if "sampling" in result.attributes:
         groups["harmonics"] = {"sampling": result.attributes["sampling"]}
     case = result.case.replace(**groups)

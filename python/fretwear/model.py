@@ -50,6 +50,13 @@ class ContactPairs:
         Stiffness of the elastic law ('penalty') [force/length].
     slip_speed : float or (n_pairs,), optional
         Sliding velocity of smooth friction ('regularised') [length/s].
+    mu_dynamic, weakening_speed, weakening_exponent : float or (n_pairs,), optional
+        Friction of fast sliding [-], the speed over which it is reached [length/s], and the
+        exponent of the speed, 1 to 2 ('regularised').
+    mu_viscous : float or (n_pairs,), optional
+        What friction gains with the sliding speed [s/length] ('regularised').
+    speed_1, speed_2 : float or (n_pairs,), optional
+        Velocity of side 2 along t1 and t2 [length/s] ('regularised').
     law : str, optional
         The law of the pairs where a case does not name one: 'penalty', 'rigid', ...
     position : (n_pairs, 3), optional
@@ -70,6 +77,12 @@ class ContactPairs:
     patch: Sequence[str] | None = None
     sector_2: ArrayLike | None = None
     slip_speed: ArrayLike | None = None
+    mu_dynamic: ArrayLike | None = None
+    weakening_speed: ArrayLike | None = None
+    weakening_exponent: ArrayLike | None = None
+    mu_viscous: ArrayLike | None = None
+    speed_1: ArrayLike | None = None
+    speed_2: ArrayLike | None = None
     law: str | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
@@ -80,8 +93,7 @@ class ContactPairs:
         values: dict[str, Any] = {
             name: None if getattr(self, name) is None else
             array(f"contact.{name}", getattr(self, name), (n_pairs,))
-            for name in ("mu", "gap", "area", "normal_load", "tangential_stiffness",
-                         "normal_stiffness", "slip_speed")}
+            for name in ("mu", "gap", "area", *_IN_NAMELIST)}
         if self.law is not None:
             values["law"] = text("contact.law", self.law)
         if self.sector_2 is not None:
@@ -448,7 +460,9 @@ _SPRING = ("side_1", "side_2", "sector_2", "coefficient", "power")
 _CONTACT = tuple(f"contact/{name}" for name in (
     "side_1", "side_2", "sector_2", "mu", "gap", "area", "position", "patch"))
 #: Constants that a session takes as keys, so that one of another law is refused.
-_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness", "slip_speed")
+_SLIDING = ("slip_speed", "mu_dynamic", "weakening_speed", "weakening_exponent", "mu_viscous",
+            "speed_1", "speed_2")
+_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness", *_SLIDING)
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
 

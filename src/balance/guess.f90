@@ -251,7 +251,7 @@ contains
       end if
       if (is_idle) then
          if (system%problem%fourier%harmonic(h) == 0) then
-            call find_tension(system, [(0.0_wp, j=1, size(q))], q, tension)
+            call find_tension(system, real(force, wp), q, tension)
          end if
          return
       end if
@@ -260,7 +260,9 @@ contains
       call add_pairs(system, closed, h, stiffness, force)
       call solve_free(stiffness, force, held, q)
       if (system%problem%fourier%harmonic(h) > 0) return
-      call find_tension(system, [(real(sum(stiffness(j, :)*q), wp), j=1, size(q))], q, tension)
+      ! Elastic pairs are in both.
+      call find_tension(system, [(real(force(j), wp) - real(sum(stiffness(j, :)*q), wp), &
+                                  j=1, size(q))], q, tension)
    end subroutine solve_harmonic
 
    !> Rigid pairs hold their coordinates, at minus the gap.
@@ -368,15 +370,15 @@ contains
    end subroutine solve_free
 
    !> Mean normal force of every pair at a static position.
-   subroutine find_tension(system, product, q, tension)
+   subroutine find_tension(system, left, q, tension)
       type(balance_state), intent(in) :: system
-      !> Z_0 q, where the pairs take the balance (n_coordinates).
-      real(wp), intent(in) :: product(:)
+      !> What is left of the balance, F_0 - Z_0 q less elastic forces (n_coordinates).
+      real(wp), intent(in) :: left(:)
       !> Coordinates at rest (n_coordinates).
       complex(wp), intent(in) :: q(:)
       real(wp), intent(out) :: tension(:)
       real(wp) :: opening(size(tension))
-      integer :: i, j, row
+      integer :: i, row
 
       tension = 0.0_wp
       call system%problem%incidence%gather(system%problem%joint%row(3, :), size(q), 1, &
@@ -385,10 +387,9 @@ contains
          do i = 1, size(tension)
             row = system%problem%joint%row(3, i)
             if (row == 0) cycle
-            if (p%takes_balance) then
-               j = system%problem%incidence%coordinate_of(row)
+            if (p%takes(i)) then
                ! What is left of the balance of a held row is the force that holds it.
-               tension(i) = system%load(j, 1) - product(j)
+               tension(i) = left(system%problem%incidence%coordinate_of(row))
             else
                tension(i) = p%stiffness(i, 3)*(opening(i) + p%gap(i) + system%depth(i))
             end if

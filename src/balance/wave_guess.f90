@@ -76,7 +76,7 @@ contains
       if (.not. system%problem%fourier%has_constant()) return
       allocate (product(m))
       call static_product(system, q(:, 1), product)
-      call find_tension(system, product, q(:, 1), tension)
+      call find_tension(system, system%load(:, 1) - product, q(:, 1), tension)
    end procedure solve_sectors
 
    !> Z_0 q.

@@ -127,7 +127,7 @@ contains
       integer :: k
 
       call new_forces(contact, springs, problem%joint%row, problem%joint%spring_row, &
-                      problem%forces%entry(problem%forces%pairs)%law%facts%follows_events, &
+                      problem%forces%entry(problem%forces%pairs)%law%facts%locates_events, &
                       filter_harmonics, laws)
       do k = 1, laws%n_laws
          associate (old => problem%forces%entry(k)%law%prediction, &

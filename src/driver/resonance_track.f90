@@ -82,8 +82,8 @@ contains
             self%curve%kind = r%quantity
             allocate (self%x(level%system%n + 1), self%y(level%system%n + 1, 3), source=0.0_wp)
             associate (law => level%problem%forces%entry(level%problem%forces%pairs)%law)
-               self%is_located = law%facts%follows_events
-               self%is_smooth = case%contact%n_pairs == 0 .or. law%facts%follows_events .or. &
+               self%is_located = law%facts%locates_events
+               self%is_smooth = case%contact%n_pairs == 0 .or. law%facts%locates_events .or. &
                                 .not. law%facts%has_events
             end associate
             if (r%condition == condition_phase) then

@@ -115,8 +115,8 @@ contains
       if (allocated(error) .or. more) return
       call self%cycles%find(self%path, self%table, error)
       if (allocated(error) .or. self%at_rest%slides) return
-      call self%onset%find(self%path, case%mode%end, .not. self%run%state%is_incomplete, &
-                           self%table%onset, error)
+      call self%onset%find(self%path, case%mode%end, .not. self%falls_short, self%table%onset, &
+                           error)
    end subroutine next
 
    subroutine conclude(self, case, run, error)

@@ -345,7 +345,7 @@ contains
 
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
          if (case%contact%n_pairs > 0 .and. law%facts%has_events .and. &
-             .not. law%facts%follows_events) then
+             .not. law%facts%locates_events) then
             call remarks%add('derivatives of instants', 'contact is decided at instants: '// &
                              'derivatives are those of the discretised response, which jumps '// &
                              "between instants (1 % off is usual); take harmonics%sampling = "// &

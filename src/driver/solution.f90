@@ -136,7 +136,6 @@ contains
          end select
          report%iterations = report%iterations + iterations
          call formulation%to_coefficients(unknowns, x)
-         if (self%newton%options%jacobian == jacobian_difference) given%reduced = reduced
          ! Newton's method evaluates what it accepts last; other solvers, and formulations with
          ! unknowns of their own, may have been elsewhere.
          self%stands = report%converged .and. self%kind /= solver_powell .and. &
@@ -150,6 +149,7 @@ contains
          iterations = report%iterations
          call formulation%from_coefficients(x, unknowns)
       end do
+      if (self%newton%options%jacobian == jacobian_difference) given%reduced = reduced
    end subroutine solve
 
    !> Whether the point that was evaluated last can last: its forces repeat from period to period,

@@ -151,7 +151,7 @@ contains
       integer :: percent
 
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
-         self%sampling = merge(sampling_events, sampling_uniform, law%facts%follows_events)
+         self%sampling = merge(sampling_events, sampling_uniform, law%facts%locates_events)
       end associate
       deallocate (self%work)
       allocate (self%work(0))

@@ -43,7 +43,7 @@ contains
 
       numbers = [contact%law]
       if (allocated(contact%law_of)) numbers = contact%law_of
-      ! Without a word fw_usual_law takes one.
+      ! Without a word usual_law (fw_laws) takes one.
       call keys%bind_words(key('law', law_help, shape='n_pairs', &
                                absent="'rigid' where it goes"), numbers, law_words)
       if (size(numbers) == 0) return

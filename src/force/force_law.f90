@@ -79,6 +79,9 @@ module fw_force_law
       logical :: has_events = .false.
       !> They are followed so: forces at the instants are there after `sample` only.
       logical :: follows_events = .false.
+      !> Every path that has events is followed so: beside pairs of a law without any, forces are
+      !> there at the instants all the same.
+      logical :: locates_events = .false.
       !> Its forces are the projection of their histories alone, not a collocation.
       logical :: needs_projection = .false.
       !> Sliding under pressure, with its derivative: what wear takes. The law leaves both in its

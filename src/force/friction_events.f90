@@ -38,6 +38,7 @@ contains
       self%facts = law%facts
       ! All other facts stay: the same law, evaluated in another way.
       self%facts%follows_events = .true.
+      self%facts%locates_events = .true.
       self%n_elements = law%n_elements
       self%n_components = law%n_components
       self%two_directions = law%two_directions

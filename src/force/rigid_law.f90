@@ -54,8 +54,9 @@ contains
    pure type(rigid_law) function friction_of_high_order() result(law)
       law%prediction = prediction_type(takes_balance=.true., has_inertia=.true.)
       law%facts = law_facts(remembers=.true., needs_independent=.true., has_events=.true., &
-                            follows_events=.true., needs_projection=.true., has_tail=.true., &
-                            measures_slip=.true., is_integrated=.true.)
+                            follows_events=.true., locates_events=.true., &
+                            needs_projection=.true., has_tail=.true., measures_slip=.true., &
+                            is_integrated=.true.)
    end function friction_of_high_order
 
    !> Room; the masses are known.

@@ -124,6 +124,8 @@ contains
       shared%needs_independent = any(facts%needs_independent)
       shared%has_events = any(facts%has_events)
       shared%follows_events = all(facts%follows_events)
+      shared%locates_events = any(facts%locates_events) .and. &
+                              all(facts%locates_events .or. .not. facts%has_events)
       shared%needs_projection = any(facts%needs_projection)
       shared%measures_slip = all(facts%measures_slip)
       shared%has_tail = all(facts%has_tail)

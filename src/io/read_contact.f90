@@ -226,6 +226,9 @@ contains
                             "', but law = "//trim(law_text(contact))// &
                             ': remove it or change the law')
       end if
+      if (.not. contact%constants%has('mu_dynamic') .and. &
+          contact%constants%has('weakening_speed')) call reader%refuse('contact', &
+         'weakening_speed', 'has no meaning without mu_dynamic: give the friction of fast sliding')
       ! Components of their own beside the constants: results and restarts hold them.
       contact%tangential_stiffness = contact%constants%get('tangential_stiffness', contact%n_pairs)
       contact%normal_stiffness = contact%constants%get('normal_stiffness', contact%n_pairs)

@@ -9,7 +9,8 @@ TEXT = """
 Chains of two to six masses with two to four pairs, each with a law of its own of `penalty`,
 `regularised`, `dlft` and `dlft_velocity`; some have a normal dof that opens and closes under
 a preload, some stick; half of the smooth ones weaken and grow with the sliding speed, a third
-slides on a moving side. One frequency, 3 to 15 harmonics, 2,048 instants.
+slides on a moving side. One frequency, 3 to 15 harmonics, 2,048 instants. Not drawn are
+`rigid`, located events and sweeps over parameters, of which the tests have single cases.
 
 The judge takes the displacements and the forces of the result. The balance of every harmonic is
 written anew, and has to hold to 1e-7 of the load. The forces of elastic pairs are marched over

@@ -196,3 +196,21 @@ def test_four_elements_are_as_integrated(tmp_path, name, bounds):
         assert difference(found.coefficients[0][:kept], wanted) < bound
         works = np.array(case["work_per_cycle"][:2])
         assert difference(found.dissipation[0][:2], works) < bound
+
+
+def test_events_stay_located_while_a_parameter_moves(tmp_path):
+    """Beside a law without events, in a sweep over a stiffness: each point as by itself."""
+    case = groups([chain(5)], [("penalty", 1, 0, 0.5), ("regularised", 2, 0, 0.4)],
+                  {"cosine": [1.0, 0.3]}, n_harmonics=5)
+    values = [0.6, 1.0, 1.7]
+    swept = {**case, "case": {"title": "swept", "analysis": "frf"},
+             "sweep": {"frequency": 0.8, "parameter": "contact%tangential_stiffness",
+                       "as": "factor", "values": values}}
+    for name in ("swept", *map(str, values)):
+        (tmp_path / name).mkdir()
+    found = run_case(tmp_path / "swept", swept)
+    for k, value in enumerate(values):
+        alone = {**case, "contact": {**case["contact"], "tangential_stiffness": [
+            value * stiffness for stiffness in case["contact"]["tangential_stiffness"]]}}
+        one = run_case(tmp_path / str(value), alone)
+        assert difference(found.coefficients[k], one.coefficients[0]) < WITHIN
