@@ -237,10 +237,14 @@ contains
          case (gap)
             if (presses(state, i)) input(1, 3) = p%stiffness(i, 3)
          case (tangential_stiffness)
+            ! Of pairs whose law has none it is no number of theirs.
+            if (p%takes(i)) return
             do c = 1, 2
+               if (p%order_of(i, c) > 0) cycle
                call elongation(self, state, i, c, input(:, c))
             end do
          case (normal_stiffness)
+            if (p%takes(i)) return
             call elongation(self, state, i, 3, input(:, 3))
             if (presses(state, i)) input(1, 3) = input(1, 3) + p%gap(i) + state%depth(i)
          case default ! acts through no input

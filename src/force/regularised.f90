@@ -53,6 +53,8 @@ module fw_regularised
 
    !> Instants while a velocity of full swing passes from -v_0 to v_0, times pi: one in each half.
    real(wp), parameter :: instants_of_turn = 8.0_wp
+   !> Sliding speed over v_0 from which tanh is 1 to 1e-7, whatever the instants.
+   real(wp), parameter :: far_from_turns = 8.0_wp
    !> Square of |v|/v_0 below which tanh(s)/s is 1 - s**2/3 to the last bit.
    real(wp), parameter :: negligible = 1.0e-9_wp
 
@@ -227,11 +229,25 @@ contains
          if (.not. self%mu(i) > 0.0_wp .or. work%state(i) == pair_open) cycle
          narrowest = self%slip_speed(i)
          if (self%sliding(i)%weakens) narrowest = min(narrowest, self%sliding(i)%weakening_speed)
+         ! On a side that is always faster friction does not turn round.
+         if (slowest_of(work%prediction_time(i, 1:2, :), self%sliding(i)%speed) > &
+             far_from_turns*narrowest) cycle
          fastest = max(fastest, norm2(maxval(abs(work%prediction_time(i, 1:2, :)), dim=2)) &
                        /narrowest)
       end do
       n = ceiling(min(instants_of_turn*fastest, 0.5_wp*real(huge(n), wp)))
    end function instants_wanted
+
+   !> The smallest sliding speed over the instants.
+   pure real(wp) function slowest_of(v, speed) result(slowest)
+      real(wp), intent(in) :: v(:, :), speed(:)
+      integer :: k
+
+      slowest = huge(1.0_wp)
+      do k = 1, size(v, 2)
+         slowest = min(slowest, norm2(v(:, k) - speed))
+      end do
+   end function slowest_of
 
    !> Forces at the instants, and the smallest pressure of each pair.
    pure subroutine rub(n_pairs, n_time, mu, slip_speed, sliding, y, lambda, pressure)

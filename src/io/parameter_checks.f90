@@ -127,10 +127,12 @@ contains
    end subroutine check_of_matrices
 
    !> Pairs that a parameter says something of.
-   pure function pairs_of(contact, number) result(counts)
+   function pairs_of(contact, number) result(counts)
       type(contact_type), intent(in) :: contact
       integer, intent(in) :: number
       logical :: counts(contact%n_pairs)
+      character(24) :: key
+      integer :: i
 
       associate (c => contact)
          select case (parameters(number)%pairs)
@@ -139,6 +141,11 @@ contains
          case (of_pressed); counts = c%side_1(3, :) == 0 .and. c%side_2(3, :) == 0
          case default; counts = .false.
          end select
+         if (.not. allocated(c%law_of)) return
+         if (any(number == [friction_coefficient, normal_load, gap])) return
+         ! A constant of some laws alone.
+         call parameter_key(number, key)
+         counts = counts .and. [(c%constants%is_taken(c%law_of(i), key), i=1, c%n_pairs)]
       end associate
    end function pairs_of
 

@@ -226,14 +226,20 @@ contains
                             "', but law = "//trim(law_text(contact))// &
                             ': remove it or change the law')
       end if
-      if (.not. contact%constants%has('mu_dynamic') .and. &
-          contact%constants%has('weakening_speed')) call reader%refuse('contact', &
-         'weakening_speed', 'has no meaning without mu_dynamic: give the friction of fast sliding')
+      if (.not. contact%constants%has('mu_dynamic')) then
+         if (contact%constants%has('weakening_speed')) call reader%refuse('contact', &
+            'weakening_speed', 'has no meaning without mu_dynamic: give the friction of fast '// &
+            'sliding')
+         if (contact%constants%has('weakening_exponent')) call reader%refuse('contact', &
+            'weakening_exponent', 'has no meaning without mu_dynamic: give the friction of '// &
+            'fast sliding')
+      end if
       ! Components of their own beside the constants: results and restarts hold them.
       contact%tangential_stiffness = contact%constants%get('tangential_stiffness', contact%n_pairs)
       contact%normal_stiffness = contact%constants%get('normal_stiffness', contact%n_pairs)
       if (reader%failed()) return
       if (allocated(contact%law_of)) call check_values(reader, contact)
+      if (reader%failed()) return
       if (contact%constants%has('normal_stiffness')) call check_normal_zeros(reader, contact)
       if (contact%constants%has('tangential_stiffness')) call check_zeros(reader, contact)
    end subroutine read_law
@@ -287,7 +293,8 @@ contains
       slides = has_tangent(contact) .and. take(contact, 'tangential_stiffness')
       do i = 1, contact%n_pairs
          if (contact%tangential_stiffness(i) > 0.0_wp .or. .not. slides(i)) cycle
-         if (any(contact%tangential_stiffness > 0.0_wp .and. is_parallel(contact, i))) cycle
+         if (any(contact%tangential_stiffness > 0.0_wp .and. is_parallel(contact, i) .and. &
+                 take(contact, 'tangential_stiffness'))) cycle
          call reader%refuse('contact', 'tangential_stiffness', '= 0 for pair '//to_text(i)// &
                             ': must be above 0, unless the pair has no tangential dof, or '// &
                             'another pair of the same tangential dofs has a stiffness')

@@ -284,7 +284,8 @@ contains
       if (i > 0) then
          n = product(self%extents(key%shape))
          k = value_count(self%namelist%entries(i))
-         if (k /= 1 .and. k /= n) then
+         ! Of nothing any words will do.
+         if (k /= 1 .and. k /= n .and. n > 0) then
             call self%refuse(self%group, trim(key%name), 'has '//to_text(k)//' values: must be '// &
                              'one for all, or one for each of '//trim(key%shape)//' = '// &
                              to_text(n)//', '//accepts)

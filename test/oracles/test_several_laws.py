@@ -8,8 +8,10 @@ residual that shares no code.
 import itertools
 import json
 
+import h5py
 import numpy as np
 import pytest
+from cases import run
 from oracle_runs import run_case
 from project import ROOT
 
@@ -214,3 +216,32 @@ def test_events_stay_located_while_a_parameter_moves(tmp_path):
             value * stiffness for stiffness in case["contact"]["tangential_stiffness"]]}}
         one = run_case(tmp_path / str(value), alone)
         assert difference(found.coefficients[k], one.coefficients[0]) < WITHIN
+
+
+def test_derivatives_are_those_of_pairs_that_take_the_constant(tmp_path):
+    """By differences; of pairs whose law has no stiffness it is exactly zero."""
+    case = groups([chain(6, 3)], [("penalty", 1, 0, 0.4), ("dlft", 2, 0, 0.3),
+                                  ("regularised", 3, 0, 0.3)],
+                  {"cosine": [1.0, 0.4, -0.5]}, n_harmonics=5)
+    case["contact"]["tangential_stiffness"] = [1.0, 0.7, 0.9]
+    key = "contact%tangential_stiffness"
+    for name in ("a", "b", "c"):
+        (tmp_path / name).mkdir()
+    run_case(tmp_path / "a", {**case, "sensitivity": {"parameters": key}})
+    with h5py.File(tmp_path / "a" / "case.h5") as file:
+        found = file["sensitivity/largest/contact_tangential_stiffness"][0].ravel()
+    ends = []
+    for name, step in (("b", 1e-4), ("c", -1e-4)):
+        moved = {**case, "contact": {**case["contact"],
+                                     "tangential_stiffness": [1.0 + step, 0.7, 0.9]}}
+        ends.append(run_case(tmp_path / name, moved).amplitude[0, 0])
+    # Differences of the second order, of solutions known to 1e-8.
+    assert abs(found[0] - (ends[0] - ends[1]) / 2e-4) < 1e-3 * abs(found[0])
+    assert found[1] == 0.0 and found[2] == 0.0
+
+
+def test_an_elastic_pair_needs_a_stiffness_of_its_own(tmp_path):
+    case = groups([chain(7)], [("penalty", 2, 0, 0.4), ("regularised", 2, 0, 0.3)],
+                  {"cosine": [1.0, 0.4]})
+    case["contact"]["tangential_stiffness"] = [0.0, 1.0]
+    assert "= 0 for pair 1" in run(tmp_path, case, status=3).stderr

@@ -60,6 +60,7 @@ def test_a_moving_side_has_even_harmonics(tmp_path):
 
 
 @pytest.mark.parametrize(("contact", "words"), [
+    ({"weakening_exponent": 2.0}, "weakening_exponent has no meaning without mu_dynamic"),
     ({"weakening_speed": 0.3}, "weakening_speed has no meaning without mu_dynamic"),
     ({"mu_dynamic": 0.2}, "weakening_speed is missing"),
     ({"mu_dynamic": 0.2, "weakening_speed": 0.3, "weakening_exponent": 3.0},
