@@ -60,6 +60,11 @@ class NonlinearMode:
     modal_mass : (n_points,)
         Mass of the mode at the first observed quantity, as its shape is at each amplitude: the
         modal amplitude over that of the first harmonic, squared.
+    onset_known_by : str
+        'bound', 'solutions', 'stuck', 'below', 'every' or 'none', as the user guide has them; ''
+        in results of older versions.
+    onset_bound : float
+        Amplitude above which nothing can stick; NaN where it is not known.
     """
 
     number: int
@@ -73,6 +78,8 @@ class NonlinearMode:
     onset: float
     limit_cycles: tuple[LimitCycle, ...]
     modal_mass: Floats
+    onset_known_by: str = ""
+    onset_bound: float = float("nan")
 
     def forced_damping_ratio(self, mass: float | None = None) -> Floats:
         """F/(2 m a) of the forced motion at its phase resonance (n_points), as it is measured.
@@ -121,4 +128,5 @@ def read_mode(result: ResultFile) -> NonlinearMode:
         int(facts["number"]), control, amplitude, result["omega"], damping,
         result["converged"].astype(bool), float(facts["stuck_omega"]),
         float(facts["stuck_damping_ratio"]), float(facts["onset_amplitude"]), tuple(cycles),
-        np.asarray(mass))
+        np.asarray(mass), str(facts.get("onset_known_by", "")),
+        float(facts.get("onset_bound", np.nan)))

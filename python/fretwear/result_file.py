@@ -25,6 +25,7 @@ _REMEDIES = {
     "contact/position": "give the pairs places (contact/position of a model)",
     "contact/area": "give the pairs areas (contact%area)",
     "contact/patch": "give the pairs patches (contact/patch of a model)",
+    "contact/law": "all pairs have one law: contact%law of the namelist",
     "contact/": "it needs contact pairs, and output%contact = .true.",
     "history/": "run with output%histories = .true.",
     "floquet/": "run with sweep%stability = .true.",

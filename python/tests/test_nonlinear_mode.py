@@ -45,6 +45,7 @@ def test_curve(fluttering: fw.Result) -> None:
     assert mode.stuck_omega == pytest.approx(np.sqrt(2.0), rel=1e-12)
     assert mode.stuck_damping_ratio == pytest.approx(-0.2 / (2 * np.sqrt(2.0)), rel=1e-12)
     assert mode.onset == pytest.approx(0.5, rel=1e-12)
+    assert mode.onset_known_by in {"bound", "solutions", "stuck"}
     np.testing.assert_allclose(mode.frequency, mode.omega / (2 * np.pi))
 
 

@@ -2,10 +2,11 @@
 module fw_law_text
    use fw_contact_data, only: contact_type
    use fw_laws, only: law_words, laws_of
+   use fw_text, only: string_type
    implicit none (type, external)
    private
 
-   public :: law_text, law_text_length
+   public :: law_of_pairs, law_text, law_text_length
 
    !> Of all words, each in quotes, with a comma between.
    integer, parameter :: law_text_length = size(law_words)*(len(law_words) + 4)
@@ -25,5 +26,17 @@ contains
          text = trim(text)//", '"//trim(law_words(numbers(k)))//"'"
       end do
    end function law_text
+
+   !> The word of each pair, of a contact whose pairs differ (n_pairs).
+   pure subroutine law_of_pairs(contact, words)
+      type(contact_type), intent(in) :: contact
+      type(string_type), allocatable, intent(out) :: words(:)
+      integer :: i
+
+      allocate (words(contact%n_pairs))
+      do i = 1, size(words)
+         words(i)%text = trim(law_words(contact%law_of(i)))
+      end do
+   end subroutine law_of_pairs
 
 end module fw_law_text

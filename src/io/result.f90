@@ -14,6 +14,7 @@ module fw_result
    use fw_harmonics_options, only: sampling_words
    use fw_hdf5, only: hdf5_file, write_attribute
    use fw_kinds, only: wp
+   use fw_law_text, only: law_of_pairs
    use fw_point, only: point_type
    use fw_result_group, only: group_writer, result_group
    use fw_result_part, only: at_work, create_part, delete_part, publish_part
@@ -331,6 +332,7 @@ contains
    subroutine write_pairs(contact, to)
       type(contact_type), intent(in) :: contact
       type(group_writer), intent(inout) :: to
+      type(string_type), allocatable :: words(:)
 
       if (allocated(contact%position)) then
          call to%put('/contact/position', contact%position, '<length>', 'pair axis', &
@@ -341,6 +343,10 @@ contains
       end if
       if (allocated(contact%patch)) then
          call to%put('/contact/patch', contact%patch, '', 'pair', 'patch that the pair belongs to')
+      end if
+      if (allocated(contact%law_of)) then
+         call law_of_pairs(contact, words)
+         call to%put('/contact/law', words, '', 'pair', 'law of the pair')
       end if
    end subroutine write_pairs
 

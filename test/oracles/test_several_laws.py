@@ -147,6 +147,13 @@ def test_one_word_is_one_for_each_pair(tmp_path):
     assert np.array_equal(each.force, one.force)
 
 
+def test_the_result_says_which_law_a_pair_has(tmp_path):
+    pairs = [("penalty", 1, 0, 0.5), ("dlft", 2, 0, 0.4)]
+    run_case(tmp_path, groups([chain(4)], pairs, {"cosine": [1.0, 0.0]}))
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert list(file["contact/law"].asstr()[:]) == ["penalty", "dlft"]
+
+
 REFERENCE = json.loads((ROOT / "test" / "reference" / "laws" / "law_several.json").read_text())
 
 
