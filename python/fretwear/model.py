@@ -57,8 +57,9 @@ class ContactPairs:
         What friction gains with the sliding speed [s/length] ('regularised').
     speed_1, speed_2 : float or (n_pairs,), optional
         Velocity of side 2 along t1 and t2 [length/s] ('regularised').
-    law : str, optional
-        The law of the pairs where a case does not name one: 'penalty', 'rigid', ...
+    law : str or sequence of str, optional
+        The law of the pairs where a case does not name one: 'penalty', 'rigid', ..., or that of
+        each (n_pairs).
     position : (n_pairs, 3), optional
         Coordinates, for pictures [length].
     patch : sequence of str, optional
@@ -83,7 +84,7 @@ class ContactPairs:
     mu_viscous: ArrayLike | None = None
     speed_1: ArrayLike | None = None
     speed_2: ArrayLike | None = None
-    law: str | None = None
+    law: str | Sequence[str] | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -94,8 +95,12 @@ class ContactPairs:
             name: None if getattr(self, name) is None else
             array(f"contact.{name}", getattr(self, name), (n_pairs,))
             for name in ("mu", "gap", "area", *_IN_NAMELIST)}
-        if self.law is not None:
+        if isinstance(self.law, str):
             values["law"] = text("contact.law", self.law)
+        elif self.law is not None:
+            if len(self.law) != n_pairs:
+                raise InputError(f"contact.law: must be one word, or {n_pairs}, one per pair")
+            values["law"] = tuple(text("contact.law", word) for word in self.law)
         if self.sector_2 is not None:
             values["sector_2"] = _whole_numbers("contact.sector_2", self.sector_2, n_pairs)
         if self.position is not None:
@@ -341,7 +346,7 @@ class Model:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
                 "mass", "stiffness", "damping", "stiffness_rotation", "coriolis",
-                *_CONTACT, *_LOADS,
+                *_CONTACT, *_LOADS, "contact/law",
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
             try:
@@ -379,7 +384,10 @@ class Model:
             if self.sectors is not None:
                 groups["cyclic"] = self.sectors.attributes()
             if self.contact is not None and self.contact.law is not None:
-                groups["contact"] = {"law": self.contact.law}
+                if isinstance(self.contact.law, str):
+                    groups["contact"] = {"law": self.contact.law}
+                else:
+                    pairs["contact/law"] = strings(self.contact.law)
             write_model_file(path, {**self._datasets(), **pairs, **self._spring_datasets()},
                              title=self.title, unit_system=self.unit_system, groups=groups)
         except OSError as error:
@@ -558,9 +566,12 @@ def _contact_of(found: Mapping[str, Any], file: h5py.File) -> ContactPairs | Non
         "side_2", "sector_2", "mu", "gap", "area", "position", *_IN_NAMELIST)}
     patch = found.get("contact/patch")
     names = None if patch is None else [_text(name) for name in patch]
-    law = file["contact"].attrs.get("law")
-    return ContactPairs(found["contact/side_1"], **parts, patch=names,
-                        law=None if law is None else _text(law))
+    law: str | list[str] | None = None
+    if "law" in file["contact"].attrs:
+        law = _text(file["contact"].attrs["law"])
+    elif "contact/law" in found:
+        law = [_text(word) for word in found["contact/law"]]
+    return ContactPairs(found["contact/side_1"], **parts, patch=names, law=law)
 
 
 def _whole_numbers(name: str, values: ArrayLike, n: int) -> NDArray[np.int64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,8 @@ EYE = np.eye(6)
 
 def whole(**more: Any) -> fw.Model:
     """A model with every part that one of its kind can have."""
-    return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, contact=PAIRS, springs=[fw.Spring(1, 2, 0.5)],
+    more = {"contact": PAIRS, **more}
+    return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, springs=[fw.Spring(1, 2, 0.5)],
                     static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
                     stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
                     observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
@@ -46,6 +48,7 @@ def nodal() -> fw.Model:
 
 MODELS = {
     "plain": whole,
+    "laws": lambda: whole(contact=replace(PAIRS, law=["penalty"])),
     "sector": lambda: whole(sectors=fw.Sectors(3, [1], [-4], air=fw.Air({0: np.eye(2)},
                                                                         modes=EYE[:2]))),
     "nodal": nodal}

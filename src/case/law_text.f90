@@ -6,7 +6,7 @@ module fw_law_text
    implicit none (type, external)
    private
 
-   public :: law_of_pairs, law_text, law_text_length
+   public :: all_laws, law_of_pairs, law_text, law_text_length
 
    !> Of all words, each in quotes, with a comma between.
    integer, parameter :: law_text_length = size(law_words)*(len(law_words) + 4)
@@ -26,6 +26,17 @@ contains
          text = trim(text)//", '"//trim(law_words(numbers(k)))//"'"
       end do
    end function law_text
+
+   !> The words that there are, in quotes.
+   pure function all_laws() result(text)
+      character(law_text_length) :: text
+      integer :: k
+
+      text = "'"//trim(law_words(1))//"'"
+      do k = 2, size(law_words)
+         text = trim(text)//", '"//trim(law_words(k))//"'"
+      end do
+   end function all_laws
 
    !> The word of each pair, of a contact whose pairs differ (n_pairs).
    pure subroutine law_of_pairs(contact, words)

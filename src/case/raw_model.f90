@@ -4,6 +4,8 @@ module fw_raw_model
    use fw_contact_data, only: contact_type, spring_type
    use fw_cyclic_parts, only: cyclic_parts
    use fw_kinds, only: wp
+   use fw_law_text, only: all_laws
+   use fw_laws, only: law_words
    use fw_part, only: by_columns, either_way, part, part_source, part_type
    use fw_text, only: string_type, to_text
    implicit none (type, external)
@@ -101,6 +103,8 @@ contains
       class(part_source), intent(inout) :: to
       character(*), parameter :: each = 'one_or pair'
       real(wp), allocatable :: values(:)
+      type(string_type), allocatable :: words(:)
+      type(part_type) :: laws
       integer :: k
 
       call to%bind(part('contact/side_1', 'pair 3', 'dof numbers of t1, t2, n, from 1: '// &
@@ -122,10 +126,34 @@ contains
          end associate
       end do
       call to%note('text', part('contact@law', '', 'the law where the case names none'))
+      laws = part('contact/law', 'pair', 'in its place the law of each pair')
+      call to%bind(laws, words)
+      if (allocated(words)) call take_laws(laws, words, to, pairs)
       call to%bind(part('contact/position', 'pair 3', 'coordinates, for pictures', &
                         storage=by_columns), pairs%position)
       call to%bind(part('contact/patch', 'pair', 'name of the surface of each pair'), pairs%patch)
    end subroutine bind_pairs
+
+   !> The law of each pair by its word.
+   subroutine take_laws(laws, words, to, pairs)
+      type(part_type), intent(in) :: laws
+      type(string_type), intent(in) :: words(:)
+      class(part_source), intent(inout) :: to
+      type(contact_type), intent(inout) :: pairs
+      integer :: numbers(size(words))
+      integer :: i
+
+      do i = 1, size(words)
+         numbers(i) = findloc(law_words == words(i)%text, .true., dim=1)
+         if (numbers(i) > 0) cycle
+         call to%refuse(laws, '"'//words(i)%text//'"', trim(all_laws()))
+         return
+      end do
+      if (size(words) == 0) return
+      pairs%law = numbers(1)
+      pairs%law_is_of_model = .true.
+      if (any(numbers /= numbers(1))) pairs%law_of = numbers
+   end subroutine take_laws
 
    subroutine bind_springs(springs, to)
       type(spring_type), intent(inout) :: springs

@@ -118,6 +118,11 @@ contains
       character(:), allocatable :: word
 
       if (.not. has_attribute(file, '/contact', 'law')) return
+      if (contact%law_is_of_model) then
+         call fatal_error(error, file%path//': attribute law of /contact stands beside '// &
+                          '/contact/law: keep one', status_input)
+         return
+      end if
       call read_attribute(file, '/contact', 'law', word, error)
       if (allocated(error)) return
       contact%law = findloc(law_words == word, .true., dim=1)

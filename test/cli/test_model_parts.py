@@ -44,11 +44,11 @@ def test_a_misspelled_part_is_refused_with_the_name_that_was_meant(case, old, ne
 @pytest.mark.parametrize(("name", "expected"), [
     ("structural_damping", "damping is viscous here"), ("gyroscopic", "give the matrix"),
     ("polynomial", "as /spring"), ("springs", "did you mean /spring?"),
-    ("contact/law", "did you mean attribute law of /contact?"),
     ("unit_system", "did you mean attribute unit_system of /?"),
     ("contact/stick", "expected there: side_1, side_2, sector_2, mu, gap, area, normal_load, "
                       "tangential_stiffness, normal_stiffness, slip_speed, mu_dynamic, weakening_speed, "
-                      "weakening_exponent, mu_viscous, speed_1, speed_2, position, patch"),
+                      "weakening_exponent, mu_viscous, speed_1, speed_2, law, position, "
+                      "patch"),
     ("load/harmonic_sine", "needs /load/harmonic"), ("mesh/point", "did you mean /mesh/points?"),
     ("nodal_diameter/0/mass", "/nodal_diameter needs attribute n_physical of /cyclic"),
     ("load/harmonic", "needs their loads")])

@@ -15,6 +15,8 @@ from cases import run
 from oracle_runs import run_case
 from project import ROOT
 
+import fretwear as fw
+
 LAWS = ("dlft", "dlft_velocity", "penalty", "rigid", "regularised")
 #: Solver tolerance of all runs, and what two runs of one problem may differ by: residuals of 1e-11
 #: of the load times the condition of the structures (below 100), and a margin of ten.
@@ -252,3 +254,38 @@ def test_an_elastic_pair_needs_a_stiffness_of_its_own(tmp_path):
                   {"cosine": [1.0, 0.4]})
     case["contact"]["tangential_stiffness"] = [0.0, 1.0]
     assert "= 0 for pair 1" in run(tmp_path, case, status=3).stderr
+
+
+def model_of(case):
+    """The pairs of a case in a model file, and what is left of the case."""
+    contact, n = case["contact"], len(case["model"]["mass"])
+    pairs = fw.ContactPairs(np.reshape(contact["side_1"], (-1, 3)), mu=contact["mu"],
+                            normal_load=contact["normal_load"], law=contact["law"],
+                            tangential_stiffness=contact["tangential_stiffness"],
+                            slip_speed=contact["slip_speed"],
+                            normal_stiffness=contact["normal_stiffness"])
+    m = case["model"]
+    model = fw.Model(m["mass"], m["damping"], m["stiffness"], contact=pairs)
+    return model, {**{k: v for k, v in case.items() if k != "contact"},
+                   "model": {"source": "hdf5", "file": "m.h5"}}, n
+
+
+def test_a_model_file_says_the_law_of_each_pair(tmp_path):
+    case = groups([chain(6, 3)], [("penalty", 1, 0, 0.4), ("regularised", 3, 0, 0.3)],
+                  {"cosine": [1.0, 0.4, -0.5]}, n_harmonics=5)
+    by_keys = run_case(tmp_path, case)
+    model, rest, _ = model_of(case)
+    model.save(tmp_path / "m.h5")
+    of_file = run_case(tmp_path, rest)
+    assert np.array_equal(of_file.coefficients, by_keys.coefficients)
+    again = fw.Model.from_hdf5(tmp_path / "m.h5")
+    assert list(again.contact.law) == ["penalty", "regularised"]
+    in_memory = fw.run(fw.Case(again, **{k: v for k, v in rest.items() if k != "model"}))
+    assert np.array_equal(in_memory.coefficients, by_keys.coefficients)
+    with h5py.File(tmp_path / "m.h5", "r+") as file:
+        file["contact"].attrs["law"] = "penalty"
+    assert "stands beside /contact/law" in run(tmp_path, rest, status=3).stderr
+    with h5py.File(tmp_path / "m.h5", "r+") as file:
+        del file["contact"].attrs["law"]
+        file["contact/law"][1] = "penalti"
+    assert 'holds "penalti", expected' in run(tmp_path, rest, status=3).stderr
