@@ -156,9 +156,9 @@ contains
 
       last = size(entry%row, 1)
       do i = 1, size(entry%row, 2)
+         if (work%linear_state(i) == pair_open .or. .not. entry%law%prediction%takes(i)) cycle
          do c = 1, last
-            if (entry%row(c, i) == 0 .or. work%linear_state(i) == pair_open) cycle
-            if (.not. entry%law%prediction%takes(i)) cycle
+            if (entry%row(c, i) == 0) cycle
             ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
             if (entry%law%prediction%order_of(i, c) > 0) cycle
             j = self%problem%incidence%coordinate_of(entry%row(c, i))
@@ -543,9 +543,11 @@ contains
       !> A v, rows in use.
       real(wp), intent(in) :: balance(:, :)
       real(wp), intent(out) :: inputs(self%problem%fourier%n_coefficients, size(entry%row, 1))
+      logical :: takes
       integer :: c, row, place
 
       associate (p => entry%law%prediction)
+         takes = p%takes(element)
          do c = 1, size(entry%row, 1)
             row = entry%row(c, element)
             if (row == 0) then
@@ -555,12 +557,14 @@ contains
             call self%problem%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), &
                                                    vector, &
                                            inputs(:, c))
-            if (p%order_of(element, c) > 0) call take_rate(self%problem%fourier, rests, &
-                                                           self%rate_unit(p, element), &
-                                                           inputs(:, c))
+            if (p%order(c) > 0) then
+               if (p%order_of(element, c) > 0) call take_rate(self%problem%fourier, rests, &
+                                                              self%rate_unit(p, element), &
+                                                              inputs(:, c))
+            end if
             if (p%has_inertia) call turn_row(self%problem%fourier, self%frequency(), p, element, &
                                              c, .false., inputs(:, c))
-            if (.not. p%takes(element)) cycle
+            if (.not. takes) cycle
             place = self%active%place(self%problem%incidence%coordinate_of(row))
             if (place > 0) inputs(:, c) = inputs(:, c) - balance(place, :)
          end do

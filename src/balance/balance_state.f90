@@ -743,15 +743,15 @@ contains
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       real(wp), intent(inout) :: y(:, :, :)
-      integer :: i, c, j
+      integer :: i, c, j, row
 
       do j = 1, size(y, 3)
          do c = 1, size(y, 2)
             do i = 1, size(y, 1)
-               if (entry%row(c, i) == 0) cycle
-               if (.not. entry%law%prediction%takes(i)) cycle
+               row = entry%rigid_rows((c - 1)*size(y, 1) + i)
+               if (row == 0) cycle
                y(i, c, j) = y(i, c, j) + &
-                  self%balance(self%problem%incidence%coordinate_of(entry%row(c, i)), j)
+                  self%balance(self%problem%incidence%coordinate_of(row), j)
             end do
          end do
       end do
