@@ -143,7 +143,7 @@ bench-scaling: build ## time and memory of a frequency, 16 to 768 pairs, beside 
 	PYTHONPATH=python $(PYTHON) -m bench.run scaling $(if $(BEFORE),--before $(BEFORE))
 
 bench-limit: build ## where the time goes against its floor, and what is skipped
-	PYTHONPATH=python $(PYTHON) -m bench.run limit skips
+	PYTHONPATH=python $(PYTHON) -m bench.run limit skips laws
 
 # Another environment's Python where pyharm-os is installed: make bench-peers PEER_PYTHON=...
 PEER_PYTHON ?= $(PYTHON)

@@ -3,7 +3,7 @@
     python -m bench.run [PART ...] [--build build/release] [--before fw_run] [--quick] [-o docs]
 
 Parts: speed, precision, events, solvers, paper, iterations, aliasing, time, scaling, limit, skips,
-peers, or all; without any, speed. A part replaces its page, docs/benchmarks/PART.md, and the
+laws, peers, or all; without any, speed. A part replaces its page, docs/benchmarks/PART.md, and the
 first page is made anew.
 
 Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
@@ -38,6 +38,7 @@ from bench.precision.worn import measure_wear_precision, write_wear_precision
 from bench.solvers.iterations import measure_iterations, write_iterations
 from bench.solvers.many_starts import measure_solvers
 from bench.solvers.report import write_solvers
+from bench.speed.laws_together import measure_laws, write_laws
 from bench.speed.limit import measure_limit, write_limit
 from bench.speed.report import Measurements, write_speed
 from bench.speed.scaling import measure_scaling
@@ -157,9 +158,14 @@ def skips(job: Job) -> str:
     return write_skips(*measure_skips(job.bench, job.program("floor")))
 
 
+def laws(job: Job) -> str:
+    """What pairs of several laws cost."""
+    return write_laws(measure_laws(job.bench))
+
+
 PARTS = {"speed": speed, "precision": precision, "events": events, "solvers": solvers,
          "paper": paper, "iterations": iterations, "aliasing": aliasing, "time": integration,
-         "scaling": scaling, "limit": limit, "skips": skips, "peers": peers}
+         "scaling": scaling, "limit": limit, "skips": skips, "laws": laws, "peers": peers}
 
 
 def main() -> None:

@@ -34,7 +34,7 @@ COMMANDS = """## Measure
 | `make bench-paper` | paper, iterations, aliasing |
 | `make bench-time` | time |
 | `make bench-scaling` | scaling |
-| `make bench-limit` | limit, skips |
+| `make bench-limit` | limit, skips, laws |
 | `make bench-peers` | peers |
 | `python -m bench.speed.sectors` | sectors |
 | `python -m bench.speed.sector_modes` | modes |

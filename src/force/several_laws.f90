@@ -218,10 +218,6 @@ contains
                call take_inputs(self%member(m)%pair, work, own)
                call law%evaluate(fourier, own)
                call give_forces(self%member(m)%pair, own, work)
-               if (self%facts%follows_events) cycle
-               ! Some decide at instants: all forces are there at these.
-               call law%sample(own)
-               work%force_time(self%member(m)%pair, :, :) = own%force_time
             end associate
          end do
       end select
