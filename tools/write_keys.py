@@ -4,9 +4,9 @@
     write_keys.py [--check] [PROGRAM]
 
 Writes the tables of docs/user-guide.md, between their marks, and python/fretwear/settings.py from
-`fw_run --keys=json`, the table of keys that do not go together from `fw_run --rules` and the parts
-of a model file from `fw_run --parts`. With --check nothing is written; the status is 1 where a file
-differs.
+`fw_run --keys=json`, the table of keys that do not go together from `fw_run --rules`, the parts of
+a model file from `fw_run --parts`, and what contact laws take part in from `fw_run --check`. With
+--check nothing is written; the status is 1 where a file differs.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ import sys
 from keyword import iskeyword
 from pathlib import Path
 from typing import Any
+
+from law_table import law_table
 
 ROOT = Path(__file__).resolve().parents[1]
 GUIDE = ROOT / "docs" / "user-guide.md"
@@ -153,12 +155,13 @@ def coded_unit(key: dict[str, Any]) -> str:
     return "`unit`" if "unit" in key else ""
 
 
-def guide(groups: Keys, together: str, of_models: str, text: str) -> str:
+def guide(groups: Keys, program: str, text: str) -> str:
     """The guide with its tables renewed."""
     for group, content in groups.items():
         text = put(text, f"keys of {group}", "end of keys", table(content["keys"]))
-    text = put(text, "parts of a model file", "end of parts", of_models)
-    return put(text, "rules", "end of rules", together)
+    text = put(text, "parts of a model file", "end of parts", parts(program))
+    text = put(text, "laws", "end of laws", law_table(program, groups))
+    return put(text, "rules", "end of rules", rules(program))
 
 
 def put(text: str, name: str, last: str, lines: str) -> str:
@@ -263,8 +266,7 @@ def main() -> int:
     arguments = parser.parse_args()
     groups = declared(arguments.program)
     stale = 0
-    written = ((GUIDE, guide(groups, rules(arguments.program), parts(arguments.program),
-                            GUIDE.read_text())),
+    written = ((GUIDE, guide(groups, arguments.program, GUIDE.read_text())),
                (SETTINGS, settings(groups)))
     for path, text in written:
         if path.read_text() == text:

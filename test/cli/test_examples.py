@@ -31,6 +31,10 @@ NUMBERS = {
     "damper/damper.nml": [("peak/amplitude", None, Ellipsis, 1.205723, 1e-4)],
     "calibration/mode.nml": [("mode/damping_ratio", None, Ellipsis, 0.132967588, 1e-8)],
     "gap/gap.nml": [("amplitude", 1.15, 0, 1.332770444, 5e-6)],
+    # Integrated in time to 1e-6 of the motion (test/oracles/test_parallel_pairs.py).
+    "parallel_pairs/play.nml": [("amplitude", 1.2, 0, 0.79675388, 2e-6)],
+    "parallel_pairs/table.nml": [("amplitude", 1.0, 0, 0.57481404, 2e-6)],
+    "parallel_pairs/sliders.nml": [("amplitude", 0.8, 0, 2.8162158, 2e-6)],
     "separation/separation.nml": [("amplitude", 0.9, 0, 2.240312606, 5e-6),
                                   ("contact/dissipation", 0.9, 0, 2.830244154, 2e-5)],
     "bladed_disk/disk.nml": [("amplitude", 2.1885, 5, 0.3722907832442835, 1e-7),
