@@ -6,7 +6,7 @@ module fw_point
    implicit none (type, external)
    private
 
-   public :: point_type, point_sensitivity
+   public :: point_type, point_sensitivity, point_stress
    public :: served_words, served_by_none, served_by_newton, served_by_other_guess, &
              served_by_smaller_steps, served_by_raised_load, served_by_pseudo_time, &
              served_by_free_guess, served_by_powell, served_by_kinsol, served_by_arclength, &
@@ -34,6 +34,21 @@ module fw_point
       !> The pair or spring runs faster than what is observed.
       real(wp), allocatable :: values(:)
    end type point_sensitivity
+
+   !> Stress of the cycle at points of the structure, those of one sector after those of another
+   !> where sectors differ [force/length**2].
+   type :: point_stress
+      !> Amplitude and mean, and the share of what the point endures, not allocated where its
+      !> strength is not given (n).
+      real(wp), allocatable :: amplitude(:), mean(:), utilisation(:)
+      !> The point with the largest utilisation, else amplitude, from 0.
+      integer :: worst = 0
+      !> Points whose signed stress jumps.
+      integer :: n_jumps = 0
+      !> Fourier coefficients (0, c1, s1, ...) of xx, yy, zz, xy, yz, zx, point by point (2H+1, 6 n);
+      !> only when asked for.
+      real(wp), allocatable :: coefficients(:, :)
+   end type point_stress
 
    type :: point_type
       !> Angular frequency of the excitation [rad/s].
@@ -102,6 +117,8 @@ module fw_point
       integer :: instants_wanted = 0
       !> Derivatives by parameters, only when asked for; NaN where there is none, as at a fold.
       type(point_sensitivity), allocatable :: sensitivity(:)
+      !> Of models with rows of stress, where the case asks for it.
+      type(point_stress), allocatable :: stress
    end type point_type
 
 end module fw_point

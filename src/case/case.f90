@@ -12,6 +12,7 @@ module fw_case
    use fw_resonance_options, only: resonance_options
    use fw_sensitivity_options, only: sensitivity_options
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options
+   use fw_stress_options, only: stress_options
    use fw_text, only: string_type
    use fw_wear_options, only: wear_options
    use fw_time_options, only: time_options
@@ -101,6 +102,7 @@ module fw_case
       type(sensitivity_options) :: sensitivity
       type(mode_options) :: mode
       type(resonance_options) :: resonance
+      type(stress_options) :: stress
    contains
       procedure :: bind_keys => bind_case_keys
    end type case_type

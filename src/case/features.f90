@@ -12,7 +12,7 @@ module fw_features
    use fw_kinds, only: wp
    use fw_law_text, only: law_text, law_text_length
    use fw_laws, only: facts_of, is_viscous
-   use fw_parameters, only: harmonic_scale, static_scale
+   use fw_parameters, only: harmonic_scale, rotation_speed, static_scale
    use fw_resonance_options, only: condition_phase
    use fw_solver_options, only: continuation_arclength, jacobian_analytic, scheme_bdf, &
       scheme_implicit_euler, scheme_runge_kutta, solver_newton, solver_pseudo_time
@@ -86,6 +86,10 @@ contains
          asked = a == analysis_resonance
       case ("case%analysis = 'time'")
          asked = a == analysis_time
+      case ("case%analysis = 'modes'")
+         asked = a == analysis_modes
+      case ("resonance%parameter = 'model%rotation_speed'")
+         asked = a == analysis_resonance .and. case%resonance%parameter == rotation_speed
       case ("case%analysis = 'wear'")
          asked = a == analysis_wear
       case ("case%analysis other than 'frf'")
@@ -98,6 +102,8 @@ contains
          asked = all(a /= [analysis_frf, analysis_point, analysis_resonance, analysis_mode])
       case ('group &sensitivity')
          asked = case%sensitivity%is_wanted()
+      case ('group &stress')
+         asked = case%stress%is_wanted()
       case ('group &control')
          asked = case%control%is_wanted()
       case ('mode%synthesis')

@@ -39,7 +39,7 @@ module fw_part
 
    !> Extents that parts share.
    character(*), parameter :: words(*) = [character(9) :: 'dof', 'pair', 'spring', 'load', &
-      'quantity', 'interface', 'order', 'motion']
+      'quantity', 'interface', 'order', 'motion', 'stress']
 
    !> Goes through the parts of a model. After a failure nothing more is taken.
    type, abstract :: part_source
@@ -59,7 +59,7 @@ module fw_part
       integer, private :: extent(size(words)) = -1
    contains
       generic :: bind => bind_text, bind_texts, bind_integer, bind_integers, bind_integer_matrix, &
-         bind_reals, bind_matrix, bind_complex, bind_complex_matrix
+         bind_reals, bind_matrix, bind_tensor, bind_complex, bind_complex_matrix
       procedure(seek_part), deferred :: seek
       procedure(list_numbers), deferred :: numbers
       procedure :: note
@@ -71,7 +71,7 @@ module fw_part
       procedure :: extent_of
       procedure, private :: bind_text, bind_texts, bind_integer, bind_integers
       procedure, private :: bind_integer_matrix, bind_reals, bind_matrix, bind_complex
-      procedure, private :: bind_complex_matrix
+      procedure, private :: bind_complex_matrix, bind_tensor
    end type part_source
 
    abstract interface
@@ -276,6 +276,16 @@ contains
          values = found
       end if
    end subroutine bind_matrix
+
+   !> Three extents, in the order of Fortran.
+   subroutine bind_tensor(self, part, values)
+      class(part_source), intent(inout) :: self
+      type(part_type), intent(in) :: part
+      real(wp), allocatable, intent(inout) :: values(:, :, :)
+
+      if (has(self, part, 'real')) values = reshape(self%reals, [self%dims(1), self%dims(2), &
+                                                                    self%dims(3)])
+   end subroutine bind_tensor
 
    subroutine bind_complex(self, part, values)
       class(part_source), intent(inout) :: self

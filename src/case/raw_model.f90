@@ -6,6 +6,7 @@ module fw_raw_model
    use fw_kinds, only: wp
    use fw_law_text, only: all_laws
    use fw_laws, only: law_words
+   use fw_stress_parts, only: stress_parts
    use fw_part, only: by_columns, either_way, part, part_source, part_type
    use fw_text, only: string_type, to_text
    implicit none (type, external)
@@ -42,6 +43,7 @@ module fw_raw_model
       real(wp), allocatable :: harmonic_cosine(:, :), harmonic_sine(:, :)
       !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
       real(wp), allocatable :: coriolis(:, :)
+      type(stress_parts) :: stress
    contains
       procedure :: order
       procedure :: bind_parts
@@ -72,6 +74,7 @@ contains
       call bind_loads(self, to)
       call bind_observed(self, to)
       call self%cyclic%bind_parts(to)
+      call self%stress%bind_parts(to)
       call note_mesh(to)
    end subroutine bind_parts
 

@@ -190,8 +190,16 @@ module fw_rules
                 'it estimates no error: give wear%max_depth_step, or use '// &
                 "'rosenbrock' or 'bdf'")]
 
+   type(rule_type), parameter :: of_stress(*) = [ &
+      rule_type('group &stress', "harmonics%method = 'hdhb'", "use 'hbm'"), &
+      rule_type('group &stress', "case%analysis = 'time'", "use 'frf' or 'point'"), &
+      rule_type('group &stress', "case%analysis = 'modes'", &
+                "a mode has no size: use 'mode' or 'frf', or leave it out"), &
+      rule_type('group &stress', "resonance%parameter = 'model%rotation_speed'", &
+                'stress without motion changes with it: give single speeds')]
+
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, of_laws, &
-                                             of_wear, of_derivatives]
+                                             of_wear, of_derivatives, of_stress]
 
 contains
 

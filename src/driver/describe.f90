@@ -13,6 +13,7 @@ module fw_describe
    use fw_sensitivity_solver, only: sensitivity_solver
    use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request
+   use fw_stress_recovery, only: stress_recovery
    use fw_tail, only: recover_tail
    implicit none (type, external)
    private
@@ -24,6 +25,7 @@ module fw_describe
       type(stability_solver) :: stability
       !> Derivatives take the equations that were solved: whoever has these finds them.
       type(sensitivity_solver) :: sensitivity
+      type(stress_recovery), private :: stress
       integer(int64), private :: clock = 0
    contains
       procedure :: start_clock
@@ -72,6 +74,10 @@ contains
          if (request%histories) call recover_histories(system, n_coordinates, x, n_harmonics, point)
          if (request%cycle) call recover_cycle(system, n_coordinates, x, point)
       end associate
+      if (case%stress%is_wanted()) then
+         call self%stress%find(case, system, x, n_harmonics, point, error)
+         if (allocated(error)) return
+      end if
       if (report%converged .and. request%stability) then
          call self%stability%find(case, system, x, point, error)
       end if

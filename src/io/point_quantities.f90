@@ -14,8 +14,8 @@ module fw_point_quantities
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
-      follows_parameter, goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
-      scales_load, shows_contact, wears
+      follows_parameter, goes_over, has_endurance, has_levels, has_stress, has_tensor, &
+      is_accurate, is_controlled, is_mode, is_response, scales_load, shows_contact, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -140,6 +140,16 @@ contains
       call add('wear/rate', r, '<length>', 'step pair', 'wear depth per cycle', wears)
       call add('wear/energy', r, '<energy>', 'step pair', 'accumulated friction energy', wears)
       call add('wear/volume', r, '<volume>', 'step patch', 'worn volume of the patch', wears)
+      call add('stress/amplitude', r, '<stress>', 'point stress', &
+               'stress amplitude of the cycle', has_stress)
+      call add('stress/mean', r, '<stress>', 'point stress', 'mean stress of the cycle', has_stress)
+      call add('stress/utilisation', r, '1', 'point stress', 'share of what the point endures', &
+               has_endurance)
+      call add('stress/worst', i, '', 'point', 'point of the largest utilisation or amplitude', &
+               has_stress)
+      list(n)%missing = -1
+      call add('stress/coefficients', r, '<stress>', 'point coefficient stress component', &
+               'Fourier coefficients of xx, yy, zz, xy, yz, zx', has_tensor)
       call add_sensitivities()
       list = list(:n)
 
@@ -243,6 +253,10 @@ contains
          n = case%contact%n_pairs
       case ('spring')
          n = case%springs%n_springs
+      case ('stress')
+         n = case%stress%n_points*case%model%cyclic%n_solved()
+      case ('component')
+         n = 6
       case ('patch')
          n = count_patches(case%contact)
       case ('direction', 'state')
@@ -391,6 +405,16 @@ contains
          if (allocated(point%wear_energy)) values = point%wear_energy
       case ('wear/volume')
          if (allocated(point%wear_volume)) values = point%wear_volume
+      case ('stress/amplitude')
+         if (allocated(point%stress)) values = point%stress%amplitude
+      case ('stress/mean')
+         if (allocated(point%stress)) values = point%stress%mean
+      case ('stress/utilisation')
+         if (allocated(point%stress)) values = point%stress%utilisation
+      case ('stress/worst')
+         if (allocated(point%stress)) values = [real(point%stress%worst, wp)]
+      case ('stress/coefficients')
+         if (allocated(point%stress)) call by_rows(point%stress%coefficients, values)
       case default ! derivatives, which find_sensitivity knows
       end select
    end subroutine values_of

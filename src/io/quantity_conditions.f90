@@ -9,9 +9,28 @@ module fw_quantity_conditions
 
    public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
              goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
-             scales_load, shows_contact, wears
+             has_endurance, has_stress, has_tensor, scales_load, shows_contact, wears
 
 contains
+
+   pure logical function has_stress(case)
+      type(case_type), intent(in) :: case
+
+      has_stress = case%stress%is_wanted()
+   end function has_stress
+
+   pure logical function has_tensor(case)
+      type(case_type), intent(in) :: case
+
+      has_tensor = case%stress%writes_tensor()
+   end function has_tensor
+
+   !> The strength of its points is known.
+   pure logical function has_endurance(case)
+      type(case_type), intent(in) :: case
+
+      has_endurance = case%stress%is_judged()
+   end function has_endurance
 
    pure logical function always(case)
       type(case_type), intent(in) :: case

@@ -18,7 +18,7 @@ module fw_read_case
    use fw_read_contact, only: read_contact, read_springs
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model
-   use fw_read_options, only: read_harmonics, read_mode, read_sweep
+   use fw_read_options, only: read_harmonics, read_mode, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
    use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
@@ -273,6 +273,7 @@ contains
       call case%wear%bind_keys(reader, analyses(case%analysis)%wears)
       call case%time%bind_keys(reader)
       call read_mode(reader, case%analysis, case%mode)
+      call read_stress(reader, case%stress)
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)
       call read_observed(reader, raw, case%model)
@@ -377,6 +378,7 @@ contains
       case%idle_spring = case%springs%n_springs == 0 .and. reader%has_group('spring') .and. &
                          .not. reader%given('spring', 'n_springs')
       call read_loads(reader, options, raw, terms)
+      if (reader%has_group('stress')) call case%stress%take(raw%stress, options%rotation_speed)
       wanted = case%sensitivity%parameters
       if (case%varied > 0) then
          if (all(wanted /= case%varied)) wanted = [wanted, case%varied]

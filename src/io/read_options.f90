@@ -13,12 +13,13 @@ module fw_read_options
    use fw_reader, only: reader_type
    use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength, &
       continuation_natural
+   use fw_stress_options, only: stress_options
    use fw_text, only: to_text
    use fw_values, only: number_text
    implicit none (type, external)
    private
 
-   public :: read_harmonics, read_sweep, read_mode
+   public :: read_harmonics, read_sweep, read_mode, read_stress
 
    !> Responses that are put together from a mode.
    integer, parameter :: most_scales = 100
@@ -222,6 +223,23 @@ contains
                             ' factors: at most '//to_text(most_scales)//' are served')
       end if
    end subroutine read_mode
+
+   !> Group &stress, behind what the model says of it.
+   subroutine read_stress(reader, options)
+      type(reader_type), intent(inout) :: reader
+      type(stress_options), intent(inout) :: options
+
+      call options%bind_keys(reader)
+      if (reader%failed() .or. .not. reader%has_group('stress')) return
+      if (options%n_points == 0) then
+         call reader%refuse_model('no stress/matrix (six components at each point, for each '// &
+                                  'dof), which group &stress needs')
+      else if (allocated(options%endurance) .neqv. allocated(options%ultimate)) then
+         call reader%refuse('stress', trim(merge('ultimate ', 'endurance', &
+                            allocated(options%endurance))), 'is missing: utilisation takes both '// &
+                            'endurance and ultimate, of the case or of the model file')
+      end if
+   end subroutine read_stress
 
    !> Amplitudes one by one.
    subroutine take_amplitudes(reader, options)

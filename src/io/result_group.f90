@@ -166,8 +166,8 @@ contains
       if (len(units) > 0) call write_attribute(file, name, 'units', units, error)
    end subroutine label_dataset
 
-   !> The unit of a quantity: '<length>', '<area>', '<volume>', '<force>' or '<energy>' of the
-   !> unit system, '' where that is not known; anything else is a unit already.
+   !> The unit of a quantity: '<length>', '<area>', '<volume>', '<force>', '<energy>' or '<stress>'
+   !> of the unit system, '' where that is not known; anything else is a unit already.
    function unit_of(quantity, unit_system) result(unit)
       character(*), intent(in) :: quantity
       character(:), allocatable, intent(in) :: unit_system
@@ -190,6 +190,8 @@ contains
          unit = words(length)%text//'^3'
       case ('<force>')
          unit = words(force)%text
+      case ('<stress>')
+         unit = words(force)%text//'/'//words(length)%text//'^2'
       case ('<energy>')
          unit = words(force)%text//' '//words(length)%text
       case default ! a number
