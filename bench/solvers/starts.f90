@@ -24,7 +24,7 @@ program starts
    use fw_problem, only: build_system
    use fw_read_case, only: read_case
    use fw_recovery, only: recover_point
-   use fw_solution, only: solution_method
+   use fw_response, only: response
    use fw_solver_options, only: solver_pseudo_time
    use fw_text, only: string_type
    implicit none (type, external)
@@ -43,7 +43,7 @@ program starts
    type(case_type) :: input
    type(balance_problem), target :: problem
    type(balance_state), target :: system
-   type(solution_method) :: method
+   type(response) :: method
    type(error_type), allocatable :: error
    integer :: k
 
@@ -150,7 +150,7 @@ contains
          call method%solve_by_flow(input, input%pseudo_time, system, x, report, error)
          call stop_on(error)
       else
-         call method%solve(system, x, report)
+         call method%solve_in(system, x, report)
       end if
       call system_clock(clock_end)
       seconds = real(clock_end - clock, wp)/real(rate, wp)

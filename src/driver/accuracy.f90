@@ -547,7 +547,7 @@ contains
 
       call need(self, k, doublings, error)
       if (allocated(error)) return
-      if (self%level(self%current, self%doublings)%solver%known%kept > 0) then
+      if (self%level(self%current, self%doublings)%solver%walk%known%kept > 0) then
          call self%level(k, doublings)%take_over(self%level(self%current, self%doublings))
       end if
       self%current = k
@@ -583,9 +583,9 @@ contains
 
       memory%level = [self%current, self%doublings]
       associate (solver => self%level(self%current, self%doublings)%solver)
-         if (solver%known%kept == 0) return
-         memory%x = solver%known%x(:, 1)
-         memory%omega = solver%known%place(1)
+         if (solver%walk%known%kept == 0) return
+         memory%x = solver%walk%known%x(:, 1)
+         memory%omega = solver%walk%known%place(1)
       end associate
    end subroutine remember
 
@@ -596,7 +596,9 @@ contains
 
       self%current = memory%level(1)
       self%doublings = memory%level(2)
-      call self%level(self%current, self%doublings)%solver%known%begin_with(memory%omega, memory%x)
+      associate (walk => self%level(self%current, self%doublings)%solver%walk)
+         call walk%known%begin_with(memory%omega, memory%x)
+      end associate
    end subroutine recall
 
 end module fw_accuracy

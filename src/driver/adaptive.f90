@@ -137,9 +137,9 @@ contains
 
       memory%level(1) = self%current
       associate (solver => self%level(self%current)%solver)
-         if (solver%known%kept == 0) return
-         memory%x = solver%known%x(:, 1)
-         memory%omega = solver%known%place(1)
+         if (solver%walk%known%kept == 0) return
+         memory%x = solver%walk%known%x(:, 1)
+         memory%omega = solver%walk%known%place(1)
       end associate
    end subroutine remember
 
@@ -149,7 +149,7 @@ contains
       type(solver_memory), intent(in) :: memory
 
       self%current = memory%level(1)
-      call self%level(self%current)%solver%known%begin_with(memory%omega, memory%x)
+      call self%level(self%current)%solver%walk%known%begin_with(memory%omega, memory%x)
    end subroutine recall
 
 end module fw_adaptive

@@ -23,7 +23,7 @@ module fw_branch
    use fw_problem, only: build_system
    use fw_recovery, only: carry_solution, observed_coefficients, recover_point
    use fw_slip_gap, only: lacks_friction
-   use fw_solution, only: is_lasting
+   use fw_response, only: is_lasting
    use fw_stability_crossing, only: movement_between, multiplier_track, signature_of
    use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: new_request, note_time_limit, point_request

@@ -1,8 +1,7 @@
 !> Points of given amplitude, the last way: responses to given loads, each from the one before,
 !> until the amplitude lies between two of them. Where friction holds what is observed no guess of
 !> its motion is near, and a load below the one that lets it slip says nothing of those above.
-!> And why an amplitude was not found, in words.
-submodule(fw_controlled_response) fw_control_load
+submodule(fw_given_amplitude) fw_control_load
    implicit none (type, external)
 
    !> Loads that are tried, those in a row without a response after which no more are, and those
@@ -28,34 +27,36 @@ contains
    module procedure search_loads
       type(loaded_point) :: low, high
 
-      if (self%rest >= amplitude .or. self%problem%n_pairs == 0) return
-      call self%control%stand(place, error)
-      if (.not. allocated(error)) call enclose(self, place, amplitude, low, high, error)
+      if (self%rest >= at%level .or. self%problem%n_pairs == 0) return
+      call self%control%stand(at%along, error)
+      if (.not. allocated(error)) call enclose(self, walk, at, x, low, high, error)
       if (allocated(error) .or. .not. high%is_known) return
-      call close_in(self, place, amplitude, low, high, report, error)
+      call close_in(self, walk, at, x, low, high, report, error)
    end procedure search_loads
 
    !> Two loads whose responses are smaller and larger than the amplitude; `high` is not known where
    !> no load gave a larger one, and `low` is at rest where none gave a smaller one.
-   subroutine enclose(self, place, amplitude, low, high, error)
-      type(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: place, amplitude
+   subroutine enclose(self, walk, at, x, low, high, error)
+      class(given_amplitude), intent(inout) :: self
+      type(walk_type), intent(inout) :: walk
+      type(position), intent(in) :: at
+      real(wp), intent(inout), contiguous :: x(:)
       type(loaded_point), intent(out) :: low, high
       type(error_type), allocatable, intent(out) :: error
       type(loaded_point) :: found
       real(wp) :: load
       integer :: k, lost, n_flat
 
-      call first_load(self, place, amplitude, load, error)
+      call first_load(self, walk, at, x, load, error)
       lost = 0
       n_flat = 0
       do k = 1, most_loads
-         if (allocated(error) .or. self%system%is_interrupted()) return
+         if (allocated(error) .or. self%state%is_interrupted()) return
          call respond(self, load, low, found, error)
          if (allocated(error)) return
          lost = merge(0, lost + 1, found%is_known)
          if (lost >= most_lost) return
-         if (found%is_known .and. found%amplitude >= amplitude) then
+         if (found%is_known .and. found%amplitude >= at%level) then
             high = found
             if (low%is_known) return
             ! Not yet below it: down from here.
@@ -85,9 +86,11 @@ contains
    end subroutine enclose
 
    !> That of the linear solution with open pairs, or with stuck ones.
-   subroutine first_load(self, place, amplitude, load, error)
-      type(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: place, amplitude
+   subroutine first_load(self, walk, at, x, load, error)
+      class(given_amplitude), intent(inout) :: self
+      type(walk_type), intent(inout) :: walk
+      type(position), intent(in) :: at
+      real(wp), intent(inout), contiguous :: x(:)
       real(wp), intent(out) :: load
       type(error_type), allocatable, intent(out) :: error
       integer :: guess
@@ -95,17 +98,17 @@ contains
 
       load = abs(self%base)
       do guess = 4, 3, -1
-         call make_guess(self, guess, place, amplitude, is_there, error)
+         call self%make_guess(guess, at, walk%known, x, is_there, error)
          if (allocated(error)) return
          if (.not. is_there) cycle
-         load = abs(self%y(size(self%y)))
+         load = abs(x(size(x)))
          exit
       end do
    end subroutine first_load
 
    !> The response to a load, from the last one that is known and from linear solutions.
    subroutine respond(self, load, near, found, error)
-      type(controlled_response), intent(inout) :: self
+      class(given_amplitude), intent(inout) :: self
       real(wp), intent(in) :: load
       type(loaded_point), intent(in) :: near
       type(loaded_point), intent(out) :: found
@@ -114,15 +117,15 @@ contains
       real(wp), allocatable :: share(:, :)
       integer :: guess
 
-      allocate (found%x(self%system%n))
-      call self%system%set_parameter(load, error)
+      allocate (found%x(self%state%n))
+      call self%state%set_parameter(load, error)
       if (allocated(error)) return
       do guess = merge(1, 2, near%is_known), 3
          if (guess == 1) found%x = near%x
-         if (guess == 2) call free_guess(self%system, found%x)
-         if (guess == 3) call stuck_guess(self%system, found%x)
-         call self%method%solve(self%system, found%x, report)
-         self%iterations = self%iterations + report%iterations
+         if (guess == 2) call free_guess(self%state, found%x)
+         if (guess == 3) call stuck_guess(self%state, found%x)
+         call self%response%solve(found%x, report, error)
+         if (allocated(error)) return
          if (ends(report)) exit
       end do
       if (.not. report%converged) return
@@ -131,14 +134,16 @@ contains
       call self%control%move(found%x, load)
       found%amplitude = self%control%size_of_motion()
       allocate (share(3, self%problem%n_pairs))
-      call self%system%pair_shares(share)
+      call self%state%pair_shares(share)
       found%all_stick = all(share(1, :) >= 1.0_wp)
    end subroutine respond
 
    !> The equations with the amplitude from both ends, and from loads between them.
-   subroutine close_in(self, place, amplitude, low, high, report, error)
-      type(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: place, amplitude
+   subroutine close_in(self, walk, at, x, low, high, report, error)
+      class(given_amplitude), intent(inout) :: self
+      type(walk_type), intent(inout) :: walk
+      type(position), intent(in) :: at
+      real(wp), intent(inout), contiguous :: x(:)
       type(loaded_point), intent(inout) :: low, high
       type(solver_report), intent(inout) :: report
       type(error_type), allocatable, intent(out) :: error
@@ -149,16 +154,16 @@ contains
          if (k > 0) then
             call respond(self, sqrt(low%load*high%load), low, found, error)
             if (allocated(error) .or. .not. found%is_known) return
-            if (found%amplitude >= amplitude) then
+            if (found%amplitude >= at%level) then
                high = found
             else
                low = found
             end if
          end if
-         call go_on_from(self, place, amplitude, high, report, error)
+         call go_on_from(self, walk, at, high, x, report, error)
          if (allocated(error) .or. ends(report)) return
          if (.not. low%is_known) return
-         if (.not. low%all_stick) call go_on_from(self, place, amplitude, low, report, error)
+         if (.not. low%all_stick) call go_on_from(self, walk, at, low, x, report, error)
          if (allocated(error) .or. ends(report)) return
          if (high%load <= (1.0_wp + narrow)*low%load) exit
       end do
@@ -166,44 +171,20 @@ contains
    end subroutine close_in
 
    !> Newton's method on the amplitude from the response to a load.
-   subroutine go_on_from(self, place, amplitude, point, report, error)
-      type(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: place, amplitude
+   subroutine go_on_from(self, walk, at, point, x, report, error)
+      class(given_amplitude), intent(inout) :: self
+      type(walk_type), intent(inout) :: walk
+      type(position), intent(in) :: at
       type(loaded_point), intent(in) :: point
+      real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
 
-      self%control%amplitude = amplitude
-      self%y = [point%x, point%load]
-      call attempt(self, report, error)
+      self%control%amplitude = at%level
+      x = [point%x, point%load]
+      call self%solve(x, report, error)
       if (allocated(error)) return
-      if (report%converged) call remember(self, place, amplitude)
+      if (report%converged) call walk%known%remember(at%along, x, at%level)
    end subroutine go_on_from
-
-   module procedure explain
-      character(:), allocatable :: place, quantity
-
-      place = 'control: at '//trim(request%describe())//' '
-      quantity = case%model%observe_name(case%control%observed)%text
-      if (self%rest >= request%amplitude) then
-         note = place//'static loads alone move '//quantity//' by '//to_text(self%rest)// &
-                ', more than the amplitude '//to_text(request%amplitude)// &
-                "; give a larger one, or control%of = 'first_harmonic'"
-      else if (self%is_node) then
-         note = place//quantity//' rests under the load (a node): no load gives it an '// &
-                'amplitude; observe another place, or leave this frequency out'
-      else if (self%limit > 0.0_wp) then
-         note = place//quantity//' does not move by more than '//to_text(self%limit)// &
-                ' however large the load is, as only friction passes it on; the amplitude '// &
-                to_text(request%amplitude)//' is out of reach: give a smaller one, observe '// &
-                'another place, or give more normal load'
-      else if (self%jump(2) > self%jump(1)) then
-         note = place//'the amplitude of '//quantity//' jumps from '//to_text(self%jump(1))// &
-                ' to '//to_text(self%jump(2))//' at the load '//to_text(self%jump(3))// &
-                ', and no response of '//to_text(request%amplitude)//' was found between; '// &
-                "follow it over the load (sweep%parameter = 'load%harmonic_scale', "// &
-                "continuation = 'arclength')"
-      end if
-   end procedure explain
 
 end submodule fw_control_load

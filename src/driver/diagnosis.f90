@@ -5,7 +5,7 @@ module fw_diagnosis
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_newton, only: solver_report
-   use fw_solution, only: solution_method
+   use fw_response, only: response
    use fw_text, only: to_text
    implicit none (type, external)
    private
@@ -26,7 +26,7 @@ contains
    !> periodic solution, at the frequency and depths of the system; all within the time of a point.
    subroutine explain_failure(system, method, reason)
       type(balance_state), intent(inout), target :: system
-      type(solution_method), intent(inout) :: method
+      type(response), intent(inout) :: method
       character(:), allocatable, intent(out) :: reason
       real(wp) :: x(system%n), residual
       logical :: done
@@ -60,7 +60,7 @@ contains
    !> The largest share of the vibratory load that has a solution, from the position at rest on.
    subroutine explain_vibration(system, method, x, reason)
       type(balance_state), intent(inout), target :: system
-      type(solution_method), intent(inout) :: method
+      type(response), intent(inout) :: method
       !> Position at rest on entry.
       real(wp), intent(inout), contiguous :: x(:)
       character(:), allocatable, intent(out) :: reason
@@ -131,7 +131,7 @@ contains
    !> By halves of the interval between a share that has a solution and one that has none.
    subroutine find_largest_share(system, method, x, lower)
       type(balance_state), intent(inout), target :: system
-      type(solution_method), intent(inout) :: method
+      type(response), intent(inout) :: method
       real(wp), intent(inout), contiguous :: x(:)
       real(wp), intent(out) :: lower
       real(wp) :: upper, middle
@@ -155,7 +155,7 @@ contains
    !> Solve under a share of the vibratory load, from x, which stays where that fails.
    subroutine solve_share(system, method, share, x, done, only_set, residual)
       type(balance_state), intent(inout), target :: system
-      type(solution_method), intent(inout) :: method
+      type(response), intent(inout) :: method
       real(wp), intent(in) :: share
       real(wp), intent(inout), contiguous :: x(:)
       logical, intent(out) :: done
@@ -173,7 +173,7 @@ contains
       done = .not. allocated(error)
       if (.not. done .or. present(only_set)) return
       trial = x
-      call method%solve(system, trial, report)
+      call method%solve_in(system, trial, report)
       done = report%converged
       if (present(residual)) residual = report%residual
       if (done) x = trial

@@ -8,9 +8,8 @@ module fw_frequency_response
    use fw_bifurcation, only: bifurcation_list
    use fw_bifurcation_group, only: bifurcation_group
    use fw_case, only: analyses, case_type
-   use fw_control_branch, only: control_branch
-   use fw_controlled_response, only: controlled_response
    use fw_error, only: error_type
+   use fw_given_amplitude, only: given_amplitude
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_one_level, only: one_level
@@ -28,6 +27,8 @@ module fw_frequency_response
    use fw_sweep, only: lead_places, list_source, point_source, sweep_places
    use fw_sweep_bifurcations, only: sweep_bifurcations
    use fw_time_response, only: time_strategy
+   use fw_vibration_branch, only: vibration_branch
+   use fw_walked_points, only: walked_points
    implicit none (type, external)
    private
 
@@ -197,7 +198,7 @@ contains
       select type (source => self%source)
       type is (branch_source)
          call keep(source%branch%bifurcations, source%branch%n_solved, source%branch%iterations)
-      type is (control_branch)
+      type is (vibration_branch)
          call keep(source%folds, 0, 0)
       class default
          call keep(self%changes%found, self%changes%n_solved, self%changes%iterations)
@@ -282,11 +283,14 @@ contains
    subroutine new_strategy(case, strategy)
       type(case_type), intent(in) :: case
       class(point_strategy), allocatable, intent(out) :: strategy
+      type(walked_points), allocatable :: walked
 
       if (analyses(case%analysis)%is_integrated) then
          allocate (time_strategy :: strategy)
       else if (case%control%is_wanted()) then
-         allocate (controlled_response :: strategy)
+         allocate (walked)
+         allocate (given_amplitude :: walked%v)
+         call move_alloc(walked, strategy)
       else if (case%harmonics%adaptive) then
          allocate (adaptive_solver :: strategy)
       else if (case%harmonics%accuracy > 0.0_wp) then
@@ -305,16 +309,16 @@ contains
       integer, intent(out) :: n_points
       type(branch_source), allocatable :: branch
       type(list_source) :: list
-      type(control_branch) :: controlled
+      type(vibration_branch) :: curve
       logical :: along_branch
 
       along_branch = .false.
       n_points = 0
       select type (strategy)
-      type is (controlled_response)
+      type is (walked_points)
          if (case%sweep%continuation == continuation_arclength) then
-            call controlled%begin(case, strategy)
-            source = controlled
+            call curve%begin(case, strategy)
+            source = curve
             return
          end if
       type is (one_level)

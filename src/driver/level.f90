@@ -149,8 +149,8 @@ contains
       class(level_type), intent(in) :: source
       real(wp) :: x(self%system%n)
 
-      call carry_solution(source%system, source%solver%known%x(:, 1), self%system, x)
-      call self%solver%known%begin_with(source%solver%known%place(1), x)
+      call carry_solution(source%system, source%solver%walk%known%x(:, 1), self%system, x)
+      call self%solver%walk%known%begin_with(source%solver%walk%known%place(1), x)
       call self%system%like(source%system)
    end subroutine take_over
 

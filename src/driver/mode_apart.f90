@@ -6,7 +6,7 @@
 module fw_mode_apart
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_mode_path, only: mode_path
+   use fw_nonlinear_mode, only: mode_path
    use fw_newton, only: solver_report
    implicit none (type, external)
    private
@@ -33,17 +33,17 @@ contains
       real(wp) :: largest, reached
       integer :: k
 
-      associate (balance => path%system%balance)
+      associate (balance => path%mode%system%balance)
          if (size(balance%depth) == 0) return
          depth = balance%depth
-         largest = path%system%motion_unit*lowest*maxval(abs(path%system%motion(linear)))
+         largest = path%mode%system%motion_unit*lowest*maxval(abs(path%mode%system%motion(linear)))
          do k = 1, size(gaps)
             balance%depth = depth + gaps(k)*largest
             y = linear
             call path%solve(log(open*gaps(k)*lowest), y, report, error)
             if (allocated(error)) exit
             if (report%converged) then
-               call path%restart(log(open*gaps(k)*lowest), y)
+               call path%walk%restart(log(open*gaps(k)*lowest), y)
                call path%reach(log(lowest), y, report, reached, error)
                if (allocated(error)) exit
             end if

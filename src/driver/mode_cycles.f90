@@ -5,7 +5,7 @@ module fw_mode_cycles
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_mode_group, only: mode_row, mode_table
-   use fw_mode_path, only: mode_path
+   use fw_nonlinear_mode, only: mode_path
    use fw_newton, only: solver_report
    implicit none (type, external)
    private
@@ -102,7 +102,7 @@ contains
          weight(side) = trial(n)
       end do
       ! Stable where damping grows with the amplitude.
-      call table%add_cycle(exp(middle), path%system%frequency_unit*trial(n - 1), &
+      call table%add_cycle(exp(middle), path%mode%system%frequency_unit*trial(n - 1), &
                            (ends_y(n, 2) - ends_y(n, 1))*(ends(2) - ends(1)) > 0.0_wp)
    end subroutine find_cycle
 

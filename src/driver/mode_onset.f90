@@ -16,7 +16,7 @@ module fw_mode_onset
    use fw_kinds, only: wp
    use fw_mode_group, only: onset_at_bound, onset_below, onset_every, onset_none, onset_solutions, &
       onset_stuck, onset_type
-   use fw_mode_path, only: mode_path
+   use fw_nonlinear_mode, only: mode_path
    use fw_mode_system, only: mode_system
    use fw_newton, only: solver_report
    use fw_onset_bound, only: find_bound
@@ -149,7 +149,7 @@ contains
          return
       end if
       if (complete .and. .not. self%departed) return
-      call find_bound(path%system, self%first, self%first_y, self%departure%mu, found%bound, &
+      call find_bound(path%mode%system, self%first, self%first_y, self%departure%mu, found%bound, &
                       bounded)
       if (bounded) call below_bound(self, path, highest, found, error)
       if (.not. bounded) found%bound = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -170,7 +170,7 @@ contains
       search%departure = self%departure
       allocate (search%y(size(self%y, 1), 2), source=0.0_wp)
       call search%take(self%first, self%first_y)
-      associate (system => path%system)
+      associate (system => path%mode%system)
          ! As the curve began: with the phase of the stuck motion, whatever its rows have turned to.
          call system%remember(self%first_y)
          reduced = system%reduced
@@ -211,7 +211,7 @@ contains
       if (allocated(error)) return
       found%amplitude = self%low(1)
       if (self%above > self%low(1) .and. self%above <= coarse*coarse*self%low(1)) then
-         found%amplitude = self%between(path%system)
+         found%amplitude = self%between(path%mode%system)
       else
          found%known_by = onset_stuck
       end if
@@ -231,11 +231,11 @@ contains
       found = .false.
       onset = self%low(1)
       high = self%high
-      call bisect(self, path%system, near, onset, high)
-      before = path%iterations
+      call bisect(self, path%mode%system, near, onset, high)
+      before = path%mode%iterations
       call look(self, path, onset, error)
-      if (allocated(error) .or. self%low(1) < onset .or. path%iterations > before) return
-      call bisect(self, path%system, fine, onset, high)
+      if (allocated(error) .or. self%low(1) < onset .or. path%mode%iterations > before) return
+      call bisect(self, path%mode%system, fine, onset, high)
       if (self%high > coarse*onset) call look(self, path, coarse*onset, error)
       found = self%high <= coarse*onset*(1.0_wp + epsilon(1.0_wp))
    end subroutine find_first_slip
@@ -302,11 +302,11 @@ contains
       call self%look_from(path, amplitude, y, converged, error)
       if (allocated(error) .or. converged) return
       if (amplitude > self%low(1)) then
-         call path%restart(log(self%low(1)), self%y(:, 1))
+         call path%walk%restart(log(self%low(1)), self%y(:, 1))
          call path%reach(log(amplitude), y, report, reached, error)
          if (allocated(error)) return
          if (report%converged .or. exp(reached) > self%low(1)) then
-            call self%judge(path%system, exp(reached), y)
+            call self%judge(path%mode%system, exp(reached), y)
             if (report%converged .or. self%high < amplitude) return
          end if
       end if

@@ -7,12 +7,12 @@ module fw_one_level
    use fw_level, only: level_type
    use fw_other_starts, only: start_elsewhere
    use fw_point, only: point_type
-   use fw_point_solver, only: looks_again
-   use fw_remarks, only: is_undamped, remark_undetermined
+      use fw_remarks, only: is_undamped, remark_undetermined
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
    use fw_text, only: to_text
+   use fw_vibration, only: looks_again
    implicit none (type, external)
    private
 
@@ -67,10 +67,10 @@ contains
       if (allocated(error)) return
       if (.not. point%converged .and. goes_on(self, case, request)) then
          call start_elsewhere(case, self%level, self%below, request, &
-                              looks_again(self%level%solver%point_failures), point, error)
+                              looks_again(self%level%solver%walk%failures), point, error)
          if (allocated(error)) return
          if (point%converged) then
-            self%level%solver%point_failures = 0
+            self%level%solver%walk%failures = 0
             self%n_elsewhere = self%n_elsewhere + 1
             if (allocated(point%note)) self%way = point%note
          end if
@@ -91,7 +91,7 @@ contains
       type(point_request), intent(in) :: request
 
       goes_on = request%fallback .and. .not. self%level%solver%method%unbounded &
-                .and. .not. self%level%solver%found_ripple &
+                .and. .not. self%level%solver%walk%found_ripple &
                 .and. case%contact%n_pairs + case%springs%n_springs > 0 &
                 .and. case%contact%memory /= memory_carried
       if (goes_on .and. associated(request%interrupt)) goes_on = .not. request%interrupt%is_due()
@@ -111,8 +111,8 @@ contains
                                     state%all_converged())
          call solver%about%sensitivity%report(case, system, summary)
          call remark_undetermined(solver%method%undetermined, summary%remarks)
-         if (solver%n_by_flow > 0) call summary%line('fallback', 'pseudo-time served '// &
-                                                     to_text(solver%n_by_flow)//' points')
+         if (solver%method%n_by_flow > 0) call summary%line('fallback', 'pseudo-time served '// &
+                                                     to_text(solver%method%n_by_flow)//' points')
          if (self%n_elsewhere > 0) call summary%line('other balances', 'served '// &
                                                      to_text(self%n_elsewhere)//' points, '// &
                                                      self%way)
@@ -165,9 +165,9 @@ contains
       class(one_level), intent(in) :: self
       type(solver_memory), intent(out) :: memory
 
-      if (self%level%solver%known%kept == 0) return
-      memory%x = self%level%solver%known%x(:, 1)
-      memory%omega = self%level%solver%known%place(1)
+      if (self%level%solver%walk%known%kept == 0) return
+      memory%x = self%level%solver%walk%known%x(:, 1)
+      memory%omega = self%level%solver%walk%known%place(1)
    end subroutine remember
 
    !> Go on from such a solution.
@@ -175,15 +175,15 @@ contains
       class(one_level), intent(inout) :: self
       type(solver_memory), intent(in) :: memory
 
-      call self%level%solver%known%begin_with(memory%omega, memory%x)
+      call self%level%solver%walk%known%begin_with(memory%omega, memory%x)
    end subroutine recall
 
    !> Neither solutions nor failures are known.
    subroutine start_anew(self)
       class(one_level), intent(inout) :: self
 
-      self%level%solver%known%kept = 0
-      self%level%solver%point_failures = 0
+      self%level%solver%walk%known%kept = 0
+      self%level%solver%walk%failures = 0
    end subroutine start_anew
 
 end module fw_one_level

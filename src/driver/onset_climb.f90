@@ -7,7 +7,7 @@
 module fw_onset_climb
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_mode_path, only: mode_path
+   use fw_nonlinear_mode, only: mode_path
    use fw_onset_search, only: coarse, onset_search
    implicit none (type, external)
    private

@@ -3,7 +3,7 @@
 module fw_onset_search
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_mode_path, only: mode_path
+   use fw_nonlinear_mode, only: mode_path
    use fw_mode_system, only: mode_system
    use fw_newton, only: solver_report
    use fw_onset_bracket, only: onset_bracket
@@ -83,8 +83,8 @@ contains
       converged = .false.
       call path%solve(log(amplitude), y, report, error)
       if (allocated(error)) return
-      converged = report%converged .and. norm2(y - guess) <= path%leash*norm2(guess)
-      if (converged) call self%judge(path%system, amplitude, y)
+      converged = report%converged .and. norm2(y - guess) <= path%mode%leash*norm2(guess)
+      if (converged) call self%judge(path%mode%system, amplitude, y)
    end subroutine look_from
 
    !> On which side a solution is.

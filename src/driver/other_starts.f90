@@ -289,7 +289,7 @@ contains
       call integrate_a_few(case, level, request, x, done, error)
       if (allocated(error) .or. .not. done) return
       known = solutions_of(level%solver)
-      call level%solver%known%begin_with(request%place(), x)
+      call level%solver%walk%known%begin_with(request%place(), x)
       work = 0
       call go_from_here(case, level, known, request, point, work, done, error)
       spent = spent + work
@@ -323,7 +323,7 @@ contains
          ! Pseudo-time flows on from here, where Newton's method has gone astray.
          plain%fallback = .true.
          plain%most_work = min(request%most_work, most_work - work)
-         level%solver%flow_failures = 0
+         level%solver%method%flow_failures = 0
          call level%solve(case, plain, trial, error)
          if (allocated(error)) return
          work = work + trial%iterations
@@ -340,16 +340,16 @@ contains
       type(point_solver), intent(in) :: solver
       type(known_solutions) :: known
 
-      known%solutions = solver%known
-      known%point_failures = solver%point_failures
+      known%solutions = solver%walk%known
+      known%point_failures = solver%walk%failures
    end function solutions_of
 
    pure subroutine give_back(known, solver)
       type(known_solutions), intent(in) :: known
       type(point_solver), intent(inout) :: solver
 
-      solver%known = known%solutions
-      solver%point_failures = known%point_failures
+      solver%walk%known = known%solutions
+      solver%walk%failures = known%point_failures
    end subroutine give_back
 
 end module fw_other_starts

@@ -1,12 +1,11 @@
-!> A resonance from value to value of a parameter: a first one from a sweep, then steps that are
-!> halved where they fail, from the polynomial through the points before.
+!> A resonance as a vibration: its place is what steps are even in along a parameter. The first one
+!> comes from a sweep.
 module fw_resonance_track
    use fw_case, only: case_type
    use fw_error, only: error_type
-   use fw_extrapolation, only: extrapolate
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
-   use fw_newton, only: newton_solver, solver_report
+   use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
    use fw_parameter_problem, only: parameter_problem, renew_state
@@ -17,19 +16,20 @@ module fw_resonance_track
       search_outcome
    use fw_response_curve, only: response_curve
    use fw_response_quantity, only: of_first_harmonic
+   use fw_solution_history, only: history_options, position, solution_history
    use fw_strategy, only: new_request, point_request, solver_memory
    use fw_sweep, only: sweep_frequency
+   use fw_vibration, only: vibration, walk_options, walk_type
    implicit none (type, external)
    private
 
    public :: resonance_track
 
-   type :: resonance_track
+   type, extends(vibration) :: resonance_track
       type(parameter_problem) :: mover
       type(one_level) :: strategy
       type(response_curve) :: curve
       type(phase_system) :: phase
-      type(newton_solver) :: newton
       !> Lowest and highest frequency of a resonance [rad/s].
       real(wp) :: range(2) = 0.0_wp
       !> Whether residuals have second derivatives, piece by piece.
@@ -39,26 +39,22 @@ module fw_resonance_track
       !> Unknowns (q, omega) of the present resonance.
       real(wp), allocatable :: x(:)
       type(search_outcome) :: outcome
-      !> The last points, the newest first: what steps are even in, unknowns (n + 1, 3), and how
-      !> many there are.
-      real(wp) :: p(3) = 0.0_wp
-      real(wp), allocatable :: y(:, :)
-      integer :: kept = 0
-      !> Step that served last.
-      real(wp) :: step = huge(1.0_wp)
-      !> Iterations since the last point.
-      integer :: iterations = 0
+      !> The value that is on the way to, which its place may miss by round-off.
+      real(wp) :: wanted = 0.0_wp
    contains
       procedure :: start
+      procedure :: begin_walk
       procedure :: find_first
       procedure :: sweep
-      procedure :: reach
+      procedure :: stand
+      procedure :: solve
+      procedure :: is_same
       procedure :: bring
       procedure :: restore
    end type resonance_track
 
-   !> Shortest step of what steps are even in, over the whole, and how steps grow.
-   real(wp), parameter :: shortest = 1.0e-5_wp, growth = 1.5_wp
+   !> Shortest step, over the whole.
+   real(wp), parameter :: shortest = 1.0e-5_wp
    !> Part of its size by which a resonance may move in a step: beyond, it is another.
    real(wp), parameter :: most_moved = 0.5_wp
 
@@ -80,7 +76,7 @@ contains
          associate (level => self%strategy%level)
             call self%curve%start(level%problem, level%system, case%solver)
             self%curve%kind = r%quantity
-            allocate (self%x(level%system%n + 1), self%y(level%system%n + 1, 3), source=0.0_wp)
+            allocate (self%x(level%system%n + 1), source=0.0_wp)
             associate (law => level%problem%forces%entry(level%problem%forces%pairs)%law)
                self%is_located = law%facts%locates_events
                self%is_smooth = case%contact%n_pairs == 0 .or. law%facts%locates_events .or. &
@@ -151,18 +147,69 @@ contains
       if (self%outcome%kind /= outcome_found) return
       self%x = self%curve%x
       if (self%mover%case%resonance%condition == condition_phase) then
-         call solve(self, self%x, error)
+         call find(self, self%x, error)
          if (allocated(error)) return
       end if
       self%iterations = self%iterations + self%outcome%iterations
-      if (self%outcome%kind /= outcome_found) return
-      self%p(1) = self%mover%case%resonance%coordinate_of(self%mover%value)
-      self%y(:, 1) = self%x
-      self%kept = 1
    end subroutine find_first
 
+   !> From the first resonance on, through all the points before: steps as long as they may be.
+   subroutine begin_walk(self, walk)
+      class(resonance_track), intent(in) :: self
+      type(walk_type), intent(inout) :: walk
+
+      associate (r => self%mover%case%resonance)
+         walk%limits = walk_options(first=huge(1.0_wp), longest=huge(1.0_wp), growth=1.5_wp, &
+                                    whole=abs(r%coordinate_of(r%end) - r%coordinate_of(r%start)))
+         walk%limits%shortest = shortest*walk%limits%whole
+         call walk%known%start(size(self%x), history_options(most=3, far=0.0_wp, by_all=.true.))
+         call walk%restart(r%coordinate_of(self%mover%value), self%x)
+      end associate
+   end subroutine begin_walk
+
+   !> To the place of a value: the value itself where it is the one that is wanted.
+   subroutine stand(self, at, error)
+      class(resonance_track), intent(inout) :: self
+      type(position), intent(in) :: at
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: value
+
+      associate (r => self%mover%case%resonance)
+         value = r%value_at(at%along)
+         if (abs(at%along - r%coordinate_of(self%wanted)) <= 0.0_wp) value = self%wanted
+      end associate
+      call self%bring(value, error)
+   end subroutine stand
+
+   subroutine solve(self, x, report, error)
+      class(resonance_track), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: x(:)
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+
+      call find(self, x, error)
+      if (allocated(error)) return
+      self%iterations = self%iterations + self%outcome%iterations
+      report%converged = self%outcome%kind == outcome_found
+      report%iterations = self%outcome%iterations
+      report%residual = self%outcome%residual
+      x = self%x
+   end subroutine solve
+
+   !> A resonance that has moved too far is another.
+   logical function is_same(self, x, guess, known)
+      class(resonance_track), intent(inout) :: self
+      real(wp), intent(in) :: x(:), guess(:)
+      type(solution_history), intent(in) :: known
+
+      associate (unused => guess)
+      end associate
+      is_same = self%curve%size_of(x - known%x(:, 1)) <= most_moved
+      if (.not. is_same) self%outcome%kind = outcome_unsolved
+   end function is_same
+
    !> A resonance at the present value, from a guess; the curve has looked at it then.
-   subroutine solve(self, guess, error)
+   subroutine find(self, guess, error)
       class(resonance_track), intent(inout), target :: self
       real(wp), intent(in) :: guess(:)
       type(error_type), allocatable, intent(out) :: error
@@ -197,7 +244,7 @@ contains
       end associate
       self%curve%x = self%x
       call self%curve%look(done, error)
-   end subroutine solve
+   end subroutine find
 
    !> Bring everything to a value.
    subroutine bring(self, value, error)
@@ -211,60 +258,6 @@ contains
          self%phase%reference = self%curve%state%reference
       end associate
    end subroutine bring
-
-   !> Go on to a value by as many steps as it takes; the outcome says whether it was reached, else
-   !> the point is the last that was.
-   subroutine reach(self, value, reached, error)
-      class(resonance_track), intent(inout), target :: self
-      real(wp), intent(in) :: value
-      !> The last value.
-      real(wp), intent(out) :: reached
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: p, next, whole, guess(size(self%x))
-      logical :: done
-
-      associate (r => self%mover%case%resonance)
-         p = r%coordinate_of(value)
-         whole = abs(r%coordinate_of(r%end) - r%coordinate_of(r%start))
-         reached = r%value_at(self%p(1))
-         do
-            next = self%p(1) + sign(min(abs(p - self%p(1)), self%step), p - self%p(1))
-            ! A rest that is nothing beside the step is taken with it.
-            if (abs(p - next) < 0.1_wp*self%step) next = p
-            call self%bring(merge(value, r%value_at(next), abs(next - p) <= 0.0_wp), error)
-            if (allocated(error)) return
-            call extrapolate(self%p(:self%kept), self%y, next, guess)
-            call solve(self, guess, error)
-            if (allocated(error)) return
-            self%iterations = self%iterations + self%outcome%iterations
-            done = self%outcome%kind == outcome_found
-            if (done) done = self%curve%size_of(self%x - self%y(:, 1)) <= most_moved
-            if (done) then
-               call remember(self, next)
-               reached = r%value_at(next)
-               self%step = growth*min(self%step, whole)
-               if (abs(next - p) <= 0.0_wp) return
-            else
-               if (self%outcome%kind == outcome_found) self%outcome%kind = outcome_unsolved
-               self%step = 0.5_wp*min(self%step, abs(next - self%p(1)))
-               if (self%step >= shortest*whole) cycle
-               self%x = self%y(:, 1)
-               return
-            end if
-         end do
-      end associate
-   end subroutine reach
-
-   subroutine remember(self, p)
-      class(resonance_track), intent(inout) :: self
-      real(wp), intent(in) :: p
-
-      self%p = [p, self%p(1), self%p(2)]
-      self%y(:, 3) = self%y(:, 2)
-      self%y(:, 2) = self%y(:, 1)
-      self%y(:, 1) = self%x
-      self%kept = min(3, self%kept + 1)
-   end subroutine remember
 
    !> All states stand at a value again, after one of them has moved the problem by itself.
    subroutine restore(self, value, error)

@@ -15,7 +15,7 @@ module fw_run_mode
    use fw_mode_group, only: mode_row, mode_table, onset_every
    use fw_mode_options, only: control_observed
    use fw_mode_onset, only: onset_finder
-   use fw_mode_path, only: mode_path
+   use fw_nonlinear_mode, only: mode_path
    use fw_mode_remarks, only: remark_internal, remark_jump, remark_onset
    use fw_mode_start, only: mode_start, node
    use fw_newton, only: solver_report
@@ -135,7 +135,7 @@ contains
          end if
          call synthesize(case%mode%synthesis, self%table)
          call run%writer%add(self%table, error)
-         call run%summary%describe_work(balance, self%path%newton%linear, case%solver%kind, &
+         call run%summary%describe_work(balance, self%path%mode%newton%linear, case%solver%kind, &
                                         run%state%all_converged())
          call self%about%sensitivity%report(case, balance, run%summary)
       end associate
@@ -202,15 +202,15 @@ contains
       integer :: k
 
       curve%jumped_at = exp(reached)
-      leash = curve%path%leash
+      leash = curve%path%mode%leash
       do k = 1, size(longer)
-         curve%path%leash = longer(k)
-         call curve%path%restart(curve%first_p, curve%first_y)
+         curve%path%mode%leash = longer(k)
+         call curve%path%walk%restart(curve%first_p, curve%first_y)
          call curve%path%reach(log(case%mode%start), y, report, reached, error)
          if (allocated(error) .or. report%converged) exit
       end do
-      curve%path%leash = leash
-      if (report%converged) call curve%path%restart(reached, y)
+      curve%path%mode%leash = leash
+      if (report%converged) call curve%path%walk%restart(reached, y)
    end subroutine jump
 
    !> The first solution, below the onset.
@@ -252,7 +252,7 @@ contains
       call curve%onset%note(curve%at_rest%system, y)
       curve%first_p = log(amplitude)
       curve%first_y = y
-      call curve%path%restart(curve%first_p, y)
+      call curve%path%walk%restart(curve%first_p, y)
    end subroutine begin
 
    !> The point at the next of the given amplitudes.
@@ -268,7 +268,7 @@ contains
       more = self%table%n < case%mode%n_points
       if (.not. more) return
       associate (report => self%report)
-         before = self%path%iterations
+         before = self%path%mode%iterations
          call self%path%reach(amplitude_of(case, self%table%n + 1), self%y, report, reached, error)
          if (allocated(error)) return
          more = report%converged .and. .not. is_lost(self%y)
@@ -276,7 +276,7 @@ contains
             call end_early(self, case, exp(reached), 'no solution was found beyond')
             return
          end if
-         report%iterations = self%path%iterations - before
+         report%iterations = self%path%mode%iterations - before
          call settle_phase(self, self%y, report, error)
          if (allocated(error)) return
          call take_row(case, self, self%y, report, served_by_newton, point, error)
@@ -356,7 +356,7 @@ contains
             report%converged = again%converged
             if (.not. again%converged) return
          end if
-         call curve%path%remember(log(system%amplitude), y)
+         call curve%path%walk%known%remember(log(system%amplitude), y)
       end associate
    end subroutine settle_phase
 
@@ -439,7 +439,7 @@ contains
                return
             end if
          end if
-         call self%path%newton%linear%add_work(branch%corrector%linear)
+         call self%path%mode%newton%linear%add_work(branch%corrector%linear)
          if (allocated(error) .or. branch%complete) return
          call end_early(self, case, exp(self%end_p), branch%ending//', at')
       end associate

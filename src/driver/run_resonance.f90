@@ -19,6 +19,7 @@ module fw_run_resonance
    use fw_solver_options, only: continuation_arclength
    use fw_strategy, only: new_request, point_request
    use fw_text, only: to_text
+   use fw_vibration, only: walk_type
    implicit none (type, external)
    private
 
@@ -28,6 +29,7 @@ module fw_run_resonance
       private
       type(run_type), pointer :: run => null()
       type(resonance_track) :: track
+      type(walk_type) :: walk
       type(resonance_table) :: table
       !> Along a branch alone.
       type(arclength_type) :: branch
@@ -79,6 +81,7 @@ contains
             call find_nothing(self, case, point, more, error)
             return
          end if
+         call self%track%begin_walk(self%walk)
          more = .true.
          call take_row(case, self, .true., merge(served_by_arclength, served_by_newton, &
                                                  along_branch), point, error)
@@ -155,14 +158,18 @@ contains
       type(point_type), intent(inout) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: reached
+      type(solver_report) :: report
+      real(wp) :: reached, x(size(self%track%x))
 
       more = self%table%n < case%resonance%n_points
       if (.not. more) return
-      associate (track => self%track)
-         call track%reach(case%resonance%value_of(self%table%n + 1), reached, error)
+      associate (track => self%track, r => case%resonance)
+         track%wanted = r%value_of(self%table%n + 1)
+         call self%walk%reach(track, r%coordinate_of(track%wanted), x, report, reached, error)
          if (allocated(error)) return
-         more = track%outcome%kind == outcome_found
+         track%x = x
+         reached = r%value_at(reached)
+         more = report%converged
          if (more) then
             call take_row(case, self, .true., served_by_newton, point, error)
          else

@@ -16,7 +16,7 @@ module fw_session
    use fw_run_state, only: outcome_type
    use fw_paths, only: read_text_file
    use fw_point, only: point_type
-   use fw_point_values, only: get_point_values
+   use fw_point_quantities, only: point_quantities, quantity_type
    use fw_one_level, only: one_level
    use fw_read_case, only: case_input, read_input
    use fw_problem, only: threads_for
@@ -31,7 +31,7 @@ module fw_session
    implicit none (type, external)
    private
 
-   public :: session_type
+   public :: get_point_values, session_type
 
    !> What messages call the input of a session without a namelist file.
    character(*), parameter :: default_name = 'case'
@@ -483,5 +483,55 @@ contains
       if (allocated(self%strategy)) deallocate (self%strategy)
       if (allocated(self%kept%strategy)) deallocate (self%kept%strategy)
    end subroutine forget_system
+
+   !> The values of a point by the name of a dataset of a result file, laid out as a row of it: the
+   !> last index of the documented shape runs fastest; a flag is 1 or 0.
+   subroutine get_point_values(point, name, case, values, error)
+      type(point_type), intent(in) :: point
+      character(*), intent(in) :: name
+      !> The case that the point is of.
+      type(case_type), intent(in) :: case
+      real(wp), allocatable, intent(out) :: values(:)
+      !> status_usage where there is no such name, or the point does not hold it.
+      type(error_type), allocatable, intent(out) :: error
+      type(quantity_type), allocatable :: list(:)
+      integer :: i
+
+      call point_quantities(list)
+      do i = 1, size(list)
+         if (list(i)%name == name) exit
+      end do
+      if (i > size(list)) then
+         call unknown_name(name, list, error)
+         return
+      end if
+      call list(i)%row(point, case, values)
+      if (allocated(values)) return
+      call fatal_error(error, "the point holds no '"//name//"': histories need "// &
+                       'output%histories = .true., contact values contact pairs and '// &
+                       'output%contact = .true., Floquet multipliers sweep%stability = '// &
+                       ".true., error estimates harmonics%accuracy, derivatives &sensitivity, "// &
+                       "wear case%analysis = 'wear'", &
+                       status_usage)
+   end subroutine get_point_values
+
+   !> Say which names there are, in the order of the table.
+   subroutine unknown_name(name, list, error)
+      character(*), intent(in) :: name
+      type(quantity_type), intent(in) :: list(:)
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: names
+      integer :: i
+
+      names = trim(list(1)%name)
+      do i = 2, size(list)
+         ! Too many to name each.
+         if (any(list(i)%sensitivity /= 0)) cycle
+         names = names//', '//trim(list(i)%name)
+      end do
+      names = names//', sensitivity/QUANTITY/PARAMETER'
+      call fatal_error(error, "there is no result '"//name//"': must be one of "//names, &
+                       status_usage)
+   end subroutine unknown_name
 
 end module fw_session

@@ -8,6 +8,7 @@ module fw_strategy
    use fw_kinds, only: wp
    use fw_point, only: point_type
    use fw_run_state, only: run_state
+   use fw_solution_history, only: position
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -47,6 +48,7 @@ module fw_strategy
       integer :: most_work = huge(1)
    contains
       procedure :: place
+      procedure :: at
       procedure :: describe => describe_request
    end type point_request
 
@@ -124,6 +126,14 @@ contains
 
       place = merge(self%value, self%omega, self%has_value)
    end function place
+
+   !> The same with the level that is asked for: an amplitude, or all of the load.
+   pure type(position) function at(self)
+      class(point_request), intent(in) :: self
+
+      at = position(self%place())
+      if (self%amplitude > 0.0_wp) at%level = self%amplitude
+   end function at
 
    !> Where it is asked for, in words.
    pure function describe_request(self) result(words)

@@ -13,7 +13,7 @@ module fw_wear_recorder
    use fw_point, only: point_type, served_by_none
    use fw_point_solver, only: point_solver
    use fw_restart_rows, only: restart_row_set
-   use fw_solution, only: is_lasting
+   use fw_response, only: is_lasting
    use fw_strategy, only: new_request, point_request
    use fw_wear_march, only: wear_march, wear_observer
    use fw_wear_options, only: wear_energy, wear_pseudo_time

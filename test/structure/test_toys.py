@@ -1,5 +1,6 @@
-"""What a new law, quantity, rule, analysis, part of a model file and parameter cost: each is
-added to a copy of the tree, compiled, run, and the old files that it touched are counted.
+"""What a new law, quantity, rule, analysis, part of a model file, parameter and kind of vibration
+cost: each is added to a copy of the tree, compiled, run, and the old files that it touched are
+counted.
 
 A file of its own is free; a limit may only fall.
 """
@@ -16,7 +17,8 @@ from project import ROOT
 #: Calls between the command and Newton's method, the one of the run included.
 CALLS = 6
 #: Old files that each may touch.
-LIMITS = {"law": 1, "quantity": 1, "rule": 1, "analysis": 2, "part": 2, "parameter": 1}
+LIMITS = {"law": 1, "quantity": 1, "rule": 1, "analysis": 2, "part": 2, "parameter": 1,
+          "vibration": 2}
 
 
 class Toy:
@@ -185,8 +187,76 @@ def add_parameter(toy):
                 "                     .false.)]"))
 
 
+def add_vibration(toy):
+    """&control of = 'toy': the load is not what gives an amplitude, but that many times its own."""
+    toy.new("src/driver/toy_vibration.f90", """\
+!> A response to a multiple of the load.
+module fw_toy_vibration
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_newton, only: solver_report
+   use fw_point, only: point_type
+   use fw_response, only: response
+   use fw_sensitivity_solver, only: sensitivity_solver
+   use fw_solution_history, only: position
+   use fw_strategy, only: point_request
+   implicit none (type, external)
+   private
+
+   public :: toy_vibration
+
+   type, extends(response) :: toy_vibration
+      real(wp) :: load = 1.0_wp
+   contains
+      procedure :: stand
+      procedure :: add_to
+   end type toy_vibration
+
+contains
+
+   subroutine stand(self, at, error)
+      class(toy_vibration), intent(inout) :: self
+      type(position), intent(in) :: at
+      type(error_type), allocatable, intent(out) :: error
+
+      self%load = at%level
+      call self%response%stand(at, error)
+   end subroutine stand
+
+   subroutine add_to(self, case, request, x, report, sensitivity, point, error)
+      class(toy_vibration), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
+      real(wp), intent(in), contiguous :: x(:)
+      type(solver_report), intent(in) :: report
+      type(sensitivity_solver), intent(inout) :: sensitivity
+      type(point_type), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      point%load_scale = self%load
+      point%control = request%amplitude
+      call self%response%add_to(case, request, x, report, sensitivity, point, error)
+   end subroutine add_to
+
+end module fw_toy_vibration
+""")
+    toy.change("src/balance/control_options.f90",
+               ("   public :: control_options, of_first_harmonic, of_largest\n",
+                "   public :: control_options, of_first_harmonic, of_largest, of_toy\n"),
+               ("'first_harmonic', 'largest']", "'first_harmonic', 'largest', 'toy']"),
+               ("of_largest = 2\n", "of_largest = 2, of_toy = 3\n"))
+    toy.change("src/driver/frequency_response.f90",
+               ("   use fw_error,", "   use fw_control_options, only: of_toy\n   use fw_error,"),
+               ("   use fw_vibration_branch,",
+                "   use fw_toy_vibration, only: toy_vibration\n   use fw_vibration_branch,"),
+               ("         allocate (given_amplitude :: walked%v)\n",
+                "         if (case%control%of == of_toy) allocate (toy_vibration :: walked%v)\n"
+                "         if (.not. allocated(walked%v)) allocate (given_amplitude :: walked%v)\n"))
+
+
 TOYS = {"law": add_law, "quantity": add_quantity, "rule": add_rule, "analysis": add_analysis,
-        "part": add_part, "parameter": add_parameter}
+        "part": add_part, "parameter": add_parameter, "vibration": add_vibration}
 
 
 @pytest.fixture(scope="module", name="built")
@@ -327,6 +397,38 @@ def test_parameter_has_no_slope(built, tmp_path):
     done = run(built[0], tmp_path, "slope", RUBBING.format(law="regularised", more=more))
     assert done.returncode == 3
     assert "contact%slip_speed': its derivative is not known" in done.stderr
+
+
+def vibrate(program, folder, name, load, more, sweep=""):
+    """Result of a sweep with a load: coefficients, frequencies, scale of the load if it has one."""
+    text = RUBBING.format(law="regularised", more=more).replace("cosine = 1.0", f"cosine = {load}")
+    text = text.replace("n_points = 5", f"n_points = 5{sweep}")
+    done = run(program, folder, name, text)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(folder / f"{name}.h5") as file:
+        return {key: file[key][:] for key in ("coefficients", "omega", "load/scale")
+                if key in file}
+
+
+def test_vibration_is_swept(built, tmp_path):
+    """Points, walked to from each other, and a branch by arc length: from the base types alone."""
+    toy = vibrate(built[0], tmp_path, "toy", 1.0, "&control amplitude = 0.7, of = 'toy' /")
+    plain = vibrate(built[0], tmp_path, "plain", 0.7, "")
+    assert np.allclose(toy["load/scale"], 0.7, rtol=1e-15)
+    # Solved to 1e-8 or better, from the same guesses.
+    assert np.allclose(toy["coefficients"], plain["coefficients"], rtol=0, atol=1e-7)
+    branch = vibrate(built[0], tmp_path, "branch", 1.0,
+                     "&control amplitude = 0.7, of = 'toy' /", ", continuation = 'arclength'")
+    assert len(branch["omega"]) > 5 and branch["omega"][0] == 0.8
+    places = ", ".join(map(repr, branch["omega"].tolist()))
+    text = RUBBING.format(law="regularised", more="").replace("cosine = 1.0", "cosine = 0.7")
+    done = run(built[0], tmp_path, "there",
+               re.sub(r"&sweep.*?/\n", f"&sweep values = {places} /\n", text))
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "there.h5") as file:
+        assert np.allclose(branch["coefficients"], file["coefficients"][:], rtol=0, atol=1e-7)
+
+
 def test_calls_before_newton(built, tmp_path):
     """Who reads the sources from `run_case` on comes to Newton's method soon."""
     (tmp_path / "case.nml").write_text(RUBBING.format(law="regularised", more=""))
