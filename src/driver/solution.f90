@@ -2,7 +2,6 @@
 module fw_solution
    use fw_kinds, only: wp
    use fw_case, only: analyses, case_type
-   use fw_difference_system, only: difference_system, new_difference_system
    use fw_error, only: error_type
    use fw_flow, only: flow_system, new_flow
    use fw_formulation, only: formulation_type
@@ -23,8 +22,7 @@ module fw_solution
    use fw_unbounded, only: is_lost_in_round_off
    use fw_undetermined, only: idle_motion, undetermined_note, undetermined_search
    use fw_slip_gap, only: lacks_friction
-   use fw_solver_options, only: pseudo_time_options, jacobian_difference, solver_kinsol, &
-      solver_powell
+   use fw_solver_options, only: pseudo_time_options, solver_kinsol, solver_powell
    implicit none (type, external)
    private
 
@@ -106,23 +104,14 @@ contains
       real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(out) :: report
       type(formulation_type), target :: formulation
-      type(difference_system), target :: by_differences
-      class(parameter_system), pointer :: given, solved
+      class(parameter_system), pointer :: solved
       real(wp), allocatable :: unknowns(:)
-      logical :: reduced
       integer :: iterations, trial
 
       iterations = 0
       self%ripples = .false.
       call formulation%begin(system)
-      given => formulation%as_solved()
-      solved => given
-      reduced = given%reduced
-      if (self%newton%options%jacobian == jacobian_difference) then
-         ! The solver sees a system like any other, whose products are differences.
-         by_differences = new_difference_system(given)
-         solved => by_differences
-      end if
+      solved => formulation%as_solved()
       allocate (unknowns(system%n))
       call formulation%from_coefficients(x, unknowns)
       do trial = 1, 2
@@ -139,8 +128,7 @@ contains
          ! Newton's method evaluates what it accepts last; other solvers, and formulations with
          ! unknowns of their own, may have been elsewhere.
          self%stands = report%converged .and. self%kind /= solver_powell .and. &
-                       self%kind /= solver_kinsol .and. &
-                       self%newton%options%jacobian /= jacobian_difference
+                       self%kind /= solver_kinsol
          if (self%stands) self%stands = all(abs(unknowns - x) <= 0.0_wp)
          self%left_tolerance = .false.
          if (report%converged) call refuse_unreal(self, system, x, report)
@@ -149,7 +137,6 @@ contains
          iterations = report%iterations
          call formulation%from_coefficients(x, unknowns)
       end do
-      if (self%newton%options%jacobian == jacobian_difference) given%reduced = reduced
    end subroutine solve
 
    !> Whether the point that was evaluated last can last: its forces repeat from period to period,

@@ -227,8 +227,8 @@ def test_a_list_of_frequencies_is_a_sweep_through_them(fw_run):
     h5py = pytest.importorskip("h5py")
     found = {}
     for name, sweep, more in (("sweep.h5", "start = 0.5 end = 0.8 n_points = 4", []),
-                              ("list.h5", "frequencies = 1, 2", [
-                                  "--set", "sweep%frequencies=0.5, 0.6, 0.7, 0.8"])):
+                              ("list.h5", "values = 1, 2", [
+                                  "--set", "sweep%values=0.5, 0.6, 0.7, 0.8"])):
         fw_run.write(f"&model n_dof = 1 mass = 1 stiffness = 1 damping = 0.1 /\n"
                      f"&load cosine = 1 /\n&sweep {sweep} /\n")
         done = fw_run(*more, "-o", name, "case.nml")
