@@ -11,6 +11,7 @@ SHELL := /bin/bash
 .PHONY: parameters family
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
+.PHONY: thresholds
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
 BUILD := build/release
@@ -111,6 +112,9 @@ ways: build/deps.stamp ## the other ways to build: CMake alone, fpm, pip
 
 # Adds up the counts of docs/robustness.md once they are there, whatever they say.
 OVERVIEW := trap '$(PYTHON) test/robustness/overview.py' EXIT;
+
+thresholds: build ## limits of heuristics halved and doubled, and what random families notice
+	PYTHONPATH=python:$(BUILD)/python $(PYTHON) test/robustness/thresholds.py -o
 
 # Goes on where it was stopped; a changed program starts anew.
 stress: build ## every case to its extremes, written to docs/robustness.md

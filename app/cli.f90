@@ -24,6 +24,10 @@ module fw_cli
       logical :: rules = .false.
       !> Show the parts of a model file and do nothing.
       logical :: parts = .false.
+      !> Show what runs may remark and do nothing.
+      logical :: remarks = .false.
+      !> Show messages with what to do, and do nothing.
+      logical :: messages = .false.
       logical :: quiet = .false.
       logical :: verbose = .false.
       logical :: help = .false.
@@ -74,7 +78,7 @@ contains
          i = i + 1
       end do
       if (options%help .or. options%version .or. options%keys .or. &
-          options%rules .or. options%parts) return
+          options%rules .or. options%parts .or. options%remarks .or. options%messages) return
       if (options%quiet .and. options%verbose) then
          call fatal_error(error, '-q and -v exclude each other'//hint, status_usage)
       else if (.not. allocated(options%input)) then
@@ -206,6 +210,10 @@ contains
          options%rules = .true.
       case ('--parts')
          options%parts = .true.
+      case ('--remarks')
+         options%remarks = .true.
+      case ('--messages')
+         options%messages = .true.
       case ('-q', '--quiet')
          options%quiet = .true.
       case ('-v', '--verbose')
@@ -222,15 +230,16 @@ contains
    pure logical function is_flag(name)
       character(*), intent(in) :: name
 
-      is_flag = any(name == [character(9) :: '--check', '--rules', '--parts', '--quiet', &
-                             '--verbose', '--help', '--version'])
+      is_flag = any(name == [character(10) :: '--check', '--rules', '--parts', '--remarks', &
+                             '--messages', '--quiet', '--verbose', '--help', '--version'])
    end function is_flag
 
    function near(name) result(text)
       character(*), intent(in) :: name
       character(:), allocatable :: text
-      character(*), parameter :: names(*) = [character(9) :: '--set', '--output', '--restart', &
-         '--keys', '--rules', '--parts', '--check', '--quiet', '--verbose', '--help', '--version']
+      character(*), parameter :: names(*) = [character(10) :: '--set', '--output', '--restart', &
+         '--keys', '--rules', '--parts', '--remarks', '--messages', '--check', '--quiet', &
+         '--verbose', '--help', '--version']
       type(string_type) :: options(size(names))
       integer :: i
 

@@ -27,6 +27,8 @@ contains
          '                         --keys=json for programs', &
          '  --rules                which keys do not go together, and what to use instead', &
          '  --parts                what a model file may hold, as a table', &
+         '  --remarks              what runs may remark, and when, as a table', &
+         '  --messages             messages that ask for more than they say, and what to do', &
          '  --check                validate, print the effective input and the natural', &
          '                         frequencies within the sweep, run nothing', &
          '  -q                     errors only', &

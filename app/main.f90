@@ -8,12 +8,14 @@ program fw_run_program
    use fw_help, only: write_help
    use fw_signals, only: catch_interrupts
    use fw_key_text, only: write_keys
+   use fw_message_table, only: write_message_kinds
    use fw_run_state, only: outcome_type
    use fw_progress, only: progress_type, new_progress
    use fw_solver_options, only: unit_hertz
    use fw_read_case, only: case_input, read_input
    use fw_reader_text, only: printable
    use fw_restart_trial, only: try_restart
+   use fw_remark_table, only: write_remark_kinds
    use fw_rules, only: write_rules
    use fw_parts, only: write_parts
    use fw_run, only: check_case, run_case
@@ -49,6 +51,10 @@ contains
             call write_rules(output_unit)
          else if (options%parts) then
             call write_parts(output_unit)
+         else if (options%remarks) then
+            call write_remark_kinds(output_unit)
+         else if (options%messages) then
+            call write_message_kinds(output_unit)
          else if (options%version) then
             call describe_blas(blas)
             write (output_unit, '(a)') 'fw_run '//version, 'BLAS: '//trim(blas)

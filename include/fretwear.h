@@ -157,7 +157,7 @@ int fw_count(fw_handle handle, const char *what, int *n);
    in its layout: the last index runs fastest. fw_size says how many values there are; fw_get
    copies them to a buffer with room for n, and leaves one that is too small as it is.
    1: "omega", "converged", "iterations", "residual", "seconds", "served_by", "fold"; with
-   accuracy or adaptive "harmonics", "instants", "error_estimate"; with a sweep over another
+   accuracy "harmonics", "instants", "error_estimate"; with a sweep over another
    parameter "parameter", of a load "load/scale", which &control has with "control/amplitude"
    (2H+1, n_observed):    "coefficients", in the order (0, c1, s1, c2, s2, ...)
    (n_observed):          "amplitude", largest magnitude over the period

@@ -3,10 +3,11 @@
 
     write_keys.py [--check] [PROGRAM]
 
-Writes the tables of docs/user-guide.md, between their marks, and python/fretwear/settings.py from
+Writes the tables of the user guide, between their marks, and python/fretwear/settings.py from
 `fw_run --keys=json`, the table of keys that do not go together from `fw_run --rules`, the parts of
-a model file from `fw_run --parts`, and what contact laws take part in from `fw_run --check`. With
---check nothing is written; the status is 1 where a file differs.
+a model file from `fw_run --parts`, remarks and messages from `fw_run --remarks` and `--messages`,
+what contact laws take part in from `fw_run --check`. With --check nothing is written; the status
+is 1 where a file differs.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from typing import Any
 from law_table import law_table
 
 ROOT = Path(__file__).resolve().parents[1]
-GUIDE = ROOT / "docs" / "user-guide.md"
+#: Pages of the user guide that have tables.
+PAGES = [ROOT / "docs" / "user-guide.md"]
 SETTINGS = ROOT / "python" / "fretwear" / "settings.py"
 WIDTH = 100
 
@@ -78,6 +80,19 @@ def parts(program: str) -> str:
     for k, line in enumerate(lines[2:], 2):
         start, meaning = line.rsplit(" | ", 1)
         lines[k] = f"{start} | {code.sub(lambda found: f'`{found[0]}`', meaning)}"
+    return "\n".join(lines)
+
+
+def said(program: str, option: str) -> str:
+    """What a run may remark, and its messages, as Markdown."""
+    shown = subprocess.run([program, option], check=True, capture_output=True, text=True)
+    code = re.compile(r"(?:fw_run |fretwear run |(?<!\w))--\w+|&contact worn|&\w+ \w+ = '[^']+'|"
+                      r"\w+%\w+(?: = '[^']+')?|&\w+|(?<![\w)])/\w+(?:/\w+)*|"
+                      r"\w+ = (?:'[^']+'|[\d.]+(?:e[+-]?\d+)?)|'[^']+'|\b[a-z]+_[a-z][a-z_0-9]*\b")
+    lines = shown.stdout.splitlines()
+    for k, line in enumerate(lines[2:], 2):
+        name, text = line.removeprefix("| ").removesuffix(" |").split(" | ", 1)
+        lines[k] = f"| `{name}` | {code.sub(lambda found: f'`{found[0]}`', text)} |"
     return "\n".join(lines)
 
 
@@ -155,22 +170,30 @@ def coded_unit(key: dict[str, Any]) -> str:
     return "`unit`" if "unit" in key else ""
 
 
-def guide(groups: Keys, program: str, text: str) -> str:
-    """The guide with its tables renewed."""
-    for group, content in groups.items():
-        text = put(text, f"keys of {group}", "end of keys", table(content["keys"]))
-    text = put(text, "parts of a model file", "end of parts", parts(program))
-    text = put(text, "laws", "end of laws", law_table(program, groups))
-    return put(text, "rules", "end of rules", rules(program))
+def tables(groups: Keys, program: str) -> dict[str, tuple[str, str]]:
+    """What stands between two marks: {first mark: (last mark, lines)}."""
+    found = {f"keys of {group}": ("end of keys", table(content["keys"]))
+             for group, content in groups.items()}
+    return found | {"parts of a model file": ("end of parts", parts(program)),
+                    "remarks": ("end of remarks", said(program, "--remarks")),
+                    "messages": ("end of messages", said(program, "--messages")),
+                    "laws": ("end of laws", law_table(program, groups)),
+                    "rules": ("end of rules", rules(program))}
 
 
-def put(text: str, name: str, last: str, lines: str) -> str:
-    """A table between its two marks."""
-    begin, end = f"<!-- {name} -->\n", f"<!-- {last} -->"
-    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
-    if not pattern.search(text):
-        sys.exit(f"{GUIDE}: has no table of {name}: put {begin.strip()} and {end} there")
-    return pattern.sub(lambda _: begin + lines + "\n" + end, text)
+def renewed(found: dict[str, tuple[str, str]]) -> dict[Path, str]:
+    """The pages with their tables; each table has its place in one of them."""
+    pages = {page: page.read_text() for page in PAGES}
+    for name, (last, lines) in found.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- {last} -->"
+        pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+        homes = [page for page, text in pages.items() if pattern.search(text)]
+        if len(homes) != 1:
+            sys.exit(f"docs: {len(homes)} pages have a table of {name}, must be one: put "
+                     f"{begin.strip()} and {end} there")
+        new = begin + lines + "\n" + end
+        pages[homes[0]] = pattern.sub(lambda _, new=new: new, pages[homes[0]])
+    return pages
 
 
 def annotation(name: str, key: dict[str, Any]) -> str:
@@ -266,9 +289,8 @@ def main() -> int:
     arguments = parser.parse_args()
     groups = declared(arguments.program)
     stale = 0
-    written = ((GUIDE, guide(groups, arguments.program, GUIDE.read_text())),
-               (SETTINGS, settings(groups)))
-    for path, text in written:
+    written = renewed(tables(groups, arguments.program)) | {SETTINGS: settings(groups)}
+    for path, text in written.items():
         if path.read_text() == text:
             continue
         if arguments.check:

@@ -104,7 +104,7 @@ def features():
         "harmonics%sampling": "'events'", "harmonics%n_time": 0})
     yield Case("branch", SECTOR, {"sweep%continuation": "'arclength'", "sweep%n_points": 41})
     yield Case("harmonics of each point", SECTOR, {
-        "harmonics%adaptive": ".true.", "harmonics%n_harmonics": 9})
+        "harmonics%accuracy": 3e-2, "harmonics%n_harmonics": 9, "harmonics%n_time": 0})
     yield Case("histories", SECTOR, {"output%histories": ".true.", "sweep%n_points": 25})
     yield Case("accuracy", example("jenkins"), {
         "harmonics%n_time": 0, "harmonics%n_harmonics": 31, "harmonics%accuracy": 1e-3})

@@ -111,7 +111,7 @@ def crossing_part(rows: list[Crossing]) -> str:
         "Time of a point, with residuals, condensation and recovery, against "
         "the mean number of unknowns that were left in the linear problems: the sector near its "
         f"peak, and the oscillator with two dofs, stick and slip. {text}. "
-        "`lu_up_to` in src/solve/linear_step.f90, up to which LU is taken, is 60: where GMRES is "
+        "`lu_of_step` in src/base/size_options.f90, up to which LU is taken, is 60: where GMRES is "
         "the faster below that, the program has yet to follow.", "",
         *table(["case", "H", "unknowns left", "LU [ms]", "GMRES [ms]", "LU / GMRES"], lines), "",
         "![LU against GMRES](images/benchmark_linear.png)"])

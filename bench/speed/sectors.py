@@ -159,7 +159,7 @@ def mistuned(case: dict[str, dict[str, Any]], pairs: int, spread: float) -> dict
 def run(program: Path, folder: Path, case: dict[str, dict[str, Any]],
         points: int, start: float) -> tuple[float, float]:
     """Processor time of a sweep [s] and its largest memory [MB]."""
-    sweep = {"frequencies": np.linspace(start, start + SPAN, N_POINTS)[:points].tolist(),
+    sweep = {"values": np.linspace(start, start + SPAN, N_POINTS)[:points].tolist(),
              "unit": "Hz"}
     return execute(program, folder, case | {"sweep": case.get("sweep", {}) | sweep})
 
@@ -217,9 +217,9 @@ def measure_root(before: Path, program: Path, folder: Path, pairs: int, n_harmon
         "model": {"source": "hdf5", "file": str(model)}, "cyclic": {"engine_order": ROOT_ORDER},
         "contact": {"law": "dlft", "mu": 0.5}, "load": {"harmonic_scale": 0.5},
         "harmonics": {"n_harmonics": n_harmonics, "n_time": 128}, "output": {"contact": False},
-        "sweep": {"refine": False, "unit": "Hz", "frequencies": np.linspace(
+        "sweep": {"refine": False, "unit": "Hz", "values": np.linspace(
             ROOT_START, ROOT_START + ROOT_SPAN, ROOT_POINTS).tolist()}}
-    first = case | {"sweep": case["sweep"] | {"frequencies": [ROOT_START]}}
+    first = case | {"sweep": case["sweep"] | {"values": [ROOT_START]}}
     with tempfile.TemporaryDirectory() as place:
         times = [[(spent(one, Path(place), first), spent(one, Path(place), case))
                   for one in (before, program)] for _ in range(REPEATS)]

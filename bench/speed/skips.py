@@ -66,7 +66,7 @@ def measure_skips(bench: Bench, floor: Path) -> tuple[list[Saving], list[Spared]
                 "test_invariants.py::test_parity_auto_is_all, test_newton.pf::test_odd_is_all"),
         compare(bench, "harmonics and instants not needed (`accuracy = 1e-3`)",
                 "one mass with friction", oscillator({"accuracy": 1e-3}), oscillator(FIXED),
-                "test_adaptive.py::test_accuracy_along_a_sweep"),
+                "test_accuracy_of_sweeps.py::test_accuracy_along_a_sweep"),
         *(compare(bench, what, "16 pairs, H = 3", changed(sector, group, **{key: False}),
                   changed(sector, group, **{key: True}),
                   "test_sector_equivalence.py::test_what_is_not_asked_for_changes_nothing")

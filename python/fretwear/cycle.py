@@ -198,7 +198,7 @@ def _settings(result: Result, point: int) -> dict[str, Any]:
     """
     groups: dict[str, Any] = {
         "sweep": {"continuation": "natural", "stability": False},
-        "harmonics": {"adaptive": False, "accuracy": 0.0},
+        "harmonics": {"accuracy": 0.0},
         "output": {"histories": True, "contact": True}}
     if "sampling" in result.attributes:  # left to the program, histories would ask for instants
         groups["harmonics"]["sampling"] = result.attributes["sampling"]

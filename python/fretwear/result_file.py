@@ -33,7 +33,7 @@ _REMEDIES = {
     "wear/": "run with case%analysis = 'wear'",
     "error_estimate": "run with harmonics%accuracy",
     "instants": "run with harmonics%accuracy",
-    "harmonics": "run with harmonics%accuracy or harmonics%adaptive = .true.",
+    "harmonics": "run with harmonics%accuracy",
     "tangent/": "run with sweep%continuation = 'arclength'",
     "fold": "run with sweep%continuation = 'arclength'",
     "served_by": "run with case%analysis = 'frf' or 'point'",

@@ -42,7 +42,6 @@ UNITS: dict[str, str] = {
     "load%sine": "F",
     "load%term_amplitude": "F",
     "load%term_phase": "degrees",
-    "sweep%frequencies": "unit",
     "sweep%start": "unit",
     "sweep%end": "unit",
     "sweep%frequency": "unit",
@@ -304,11 +303,6 @@ class Harmonics(TypedDict, total=False):
     sampling: Literal["uniform", "events", "auto"]
     #: which harmonics are kept; auto leaves even ones out where that is exact (default: 'auto')
     parity: Literal["auto", "all", "odd"]
-    #: as many harmonics as each point needs, up to n_harmonics; only: natural sweeps and points
-    #: (default: .false.)
-    adaptive: bool
-    #: part of the contact and spring forces that may be left out; only: adaptive (default: 0.001)
-    adaptive_tolerance: float
     #: relative error of the response for which harmonics and instants are chosen; 0: as given;
     #: only: method = 'hbm', natural sweeps and points (default: 0)
     accuracy: float
@@ -330,9 +324,6 @@ class Sweep(_Sweep, total=False):
                        "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
                        "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
                        "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness"]
-    #: a list of frequencies in any order, in place of start, end and n_points; only: analysis =
-    #: 'frf', 'time', continuation = 'natural' (default: none)
-    frequencies: ArrayLike
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)
@@ -352,15 +343,6 @@ class Sweep(_Sweep, total=False):
     #: points that are solved to find maxima become rows, in order; only: analysis = 'frf',
     #: continuation = 'natural' (default: .false.)
     refine: bool
-    #: the first of its points that is a row: a piece of a sweep, of which others solve the rest;
-    #: only: analysis = 'frf', continuation = 'natural' (default: 1)
-    first_point: int
-    #: the last of its points that is a row; 0: the last; only: analysis = 'frf', continuation =
-    #: 'natural' (default: 0)
-    last_point: int
-    #: points on the way from the start to first_point that are solved and are no rows; only:
-    #: first_point above 1 (default: 0)
-    lead_points: int
     #: a list of values in any order, in place of start, end and n_points; only: analysis = 'frf',
     #: 'time', continuation = 'natural' (default: none)
     values: ArrayLike
@@ -377,9 +359,6 @@ class Solver(TypedDict, total=False):
     #: how linear problems are solved; auto: by their size; only: kind = 'newton', 'pseudo_time'
     #: (default: 'auto')
     linear: Literal["auto", "lu", "krylov"]
-    #: derivative of the residual; difference is a check; only: natural sweeps and points, not kind
-    #: = 'pseudo_time' (default: 'analytic')
-    jacobian: Literal["analytic", "difference"]
     #: on the norm of the residual over that of the vibratory load (default: 1e-8)
     tolerance: float
     #: steps from each guess (default: 60)

@@ -39,7 +39,7 @@ def of_series(result: fw.Result, point: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("harmonics", [
-    {}, {"n_time": 512}, {"parity": "all"}, {"method": "tcm"}, {"adaptive": True},
+    {}, {"n_time": 512}, {"parity": "all"}, {"method": "tcm"},
     {"accuracy": 1e-2, "n_harmonics": 31}], ids=str)
 def test_friction_stays_below_its_limit(harmonics: dict[str, object]) -> None:
     result = sweep(harmonics=harmonics)
@@ -113,7 +113,7 @@ def test_wear_shows_the_law_of_the_worn_joint(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("groups", [
     {}, {"harmonics": {"n_time": 512}}, {"harmonics": {"method": "tcm"}},
-    {"harmonics": {"adaptive": True}}, {"harmonics": {"accuracy": 1e-2, "n_harmonics": 31}},
+    {"harmonics": {"accuracy": 1e-2, "n_harmonics": 31}},
     {"contact": {"memory": "carried", "law": "dlft"}}, {"sweep": {"continuation": "arclength"}},
     {"case": {"analysis": "time"}, "time": {"steps_per_period": 400}}], ids=str)
 def test_a_sweep_keeps_the_period_of_its_peak(groups: dict[str, object]) -> None:

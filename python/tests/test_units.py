@@ -80,7 +80,7 @@ def test_a_number_replaces_a_value_with_a_unit(tmp_path: Path) -> None:
 
 
 def test_a_list_takes_a_unit_for_each() -> None:
-    case = fw.Case(SECTOR, sweep={"frequencies": ["1.01 kHz", "61500 rpm", "6500 rad/s"]})
+    case = fw.Case(SECTOR, sweep={"values": ["1.01 kHz", "61500 rpm", "6500 rad/s"]})
     with fw.Steps(case.replace(harmonics={"n_harmonics": 1})) as steps:
         assert steps.frequencies / (2.0 * np.pi) == pytest.approx(
             [1010.0, 1025.0, 6500.0 / (2.0 * np.pi)])

@@ -3,13 +3,12 @@
 submodule(fw_balance_state) fw_balance_preconditioner
    use fw_force_law, only: pair_mixed, pair_open
    use fw_kinds, only: sp
+   use fw_size_options, only: sizes
    implicit none (type, external)
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
    !> Share of the active coordinates that may have joined or left since a preconditioner was built.
    real(wp), parameter :: most_changed = 0.05_wp
-   !> Active coordinates from which one matrix for all harmonics is faster than one for each.
-   integer, parameter :: alike_from = 16
 
    ! Two matrices for all harmonics (fw_balance_split).
    interface
@@ -40,7 +39,8 @@ contains
       call self%form_jacobians()
       self%preconditioner%is_split = self%splits() .and. .not. allocated(self%shift)
       if (.not. (self%preconditioner%is_split .or. allocated(self%shift) .or. by_waves(self))) then
-         if (self%active%n_active >= alike_from .and. self%preconditioner%left_out == 0 .and. &
+         if (self%active%n_active >= sizes%alike_harmonics .and. &
+             self%preconditioner%left_out == 0 .and. &
              self%has_static_laws) call are_alike(self, self%preconditioner%is_split)
       end if
       if (by_waves(self)) then

@@ -11,6 +11,7 @@ module fw_balance_problem
    use fw_joint, only: joint_type
    use fw_kinds, only: wp
    use fw_reduction, only: held_basis
+   use fw_size_options, only: sizes
    use fw_structure_operator, only: structure_operator, structure_state
    implicit none (type, external)
    private
@@ -56,10 +57,6 @@ module fw_balance_problem
       procedure :: fits_whole
    end type balance_problem
 
-   !> Coordinates of all sectors up to which matrices of all of them are factored: each takes a
-   !> second or so.
-   integer, parameter :: most_whole = 1500
-
 contains
 
    !> Whether a matrix of all equal sectors together is worth its factors where waves, which take
@@ -67,7 +64,7 @@ contains
    pure logical function fits_whole(self)
       class(balance_problem), intent(in) :: self
 
-      fits_whole = self%structure%n_coordinates <= most_whole
+      fits_whole = self%structure%n_coordinates <= sizes%whole_sectors
    end function fits_whole
 
    !> Put the parts together; laws that take the balance need `scale_forces` then.

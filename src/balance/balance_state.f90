@@ -22,6 +22,7 @@ module fw_balance_state
    use fw_near_derivative, only: near_derivative
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
+   use fw_size_options, only: sizes
    use fw_structure_operator, only: structure_state
    use fw_threads, only: coordinates_for_threads, watch_team
    implicit none (type, external)
@@ -290,10 +291,6 @@ module fw_balance_state
       end subroutine precondition_columns
    end interface
 
-   !> Numbers in the derivatives of all elements from which copies in single precision pay: those
-   !> of 16 pairs and 15 harmonics, a megabyte.
-   integer, parameter :: large_blocks = 125000
-
 contains
 
    !> A state of a problem; set_frequency comes before the first residual.
@@ -370,7 +367,7 @@ contains
                         real(law%n_components*problem%fourier%n_coefficients, wp)**2
          end associate
       end do
-      blocks_are_large = n_numbers >= real(large_blocks, wp)
+      blocks_are_large = n_numbers >= real(sizes%single_blocks, wp)
    end function blocks_are_large
 
    !> Bring the problem to a value of the parameter that moves, at the present frequency, or to a

@@ -42,10 +42,6 @@ module fw_harmonics_options
       integer :: filter_harmonics = 0
       integer :: sampling = sampling_auto
       integer :: parity = parity_auto
-      !> Add harmonics only where the solution needs them.
-      logical :: adaptive = .false.
-      !> Share of the contact force that may be left out of the retained harmonics.
-      real(wp) :: adaptive_tolerance = 1.0e-3_wp
       !> Relative error that the response is to keep within (0: harmonics as given).
       real(wp) :: accuracy = 0.0_wp
       !> Neither harmonics nor an accuracy was given, and the program took one; no input.
@@ -84,11 +80,6 @@ contains
                               'or locate them on the series'), self%sampling, sampling_words)
       call keys%bind_word(key('parity', 'which harmonics are kept; auto leaves even ones out '// &
                               'where that is exact'), self%parity, parity_words)
-      call keys%bind(key('adaptive', 'as many harmonics as each point needs, up to '// &
-                         'n_harmonics', only='natural sweeps and points'), self%adaptive)
-      call keys%bind(key('adaptive_tolerance', 'part of the contact and spring forces that '// &
-                         'may be left out', above(0.0_wp), only='adaptive'), &
-                     self%adaptive_tolerance)
       call keys%bind(key('accuracy', 'relative error of the response for which harmonics and '// &
                          'instants are chosen; 0: as given', at_least(0.0_wp) .and. &
                          below(1.0_wp), only="method = 'hbm', natural sweeps and points"), &

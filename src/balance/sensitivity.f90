@@ -17,6 +17,7 @@ module fw_sensitivity
    use fw_parameters, only: friction_coefficient
    use fw_recovery, only: observe
    use fw_response_rows, only: new_rows, response_row
+   use fw_size_options, only: sizes
    use fw_solver_options, only: linear_krylov, linear_lu
    use fw_transposed_balance, only: pull_forces, transposed_balance
    implicit none (type, external)
@@ -29,8 +30,6 @@ module fw_sensitivity
    !> How derivatives are found: by whichever way takes fewer solutions, or by one of the two.
    integer, parameter :: by_counts = 0, by_direct = 1, by_adjoint = 2
 
-   !> Unknowns up to which one LU serves all solutions; GMRES above.
-   integer, parameter :: lu_up_to = 600
    !> Relative residual asked of GMRES, and what a derivative may be left with.
    real(wp), parameter :: krylov_tolerance = 1.0e-12_wp, worst_residual = 1.0e-8_wp
 
@@ -44,8 +43,8 @@ module fw_sensitivity
       !> Whether the volume is that coefficient times the energy, not times the energy over mu.
       logical :: wears_by_energy = .false.
       integer :: way = by_counts
-      !> Unknowns above which GMRES solves.
-      integer :: lu_up_to = lu_up_to
+      !> Unknowns above which GMRES solves (below 0: as many as is usual).
+      integer :: lu_up_to = -1
       !> The rows of the last response, and their derivatives (row, parameter).
       type(response_row), allocatable :: rows(:)
       real(wp), allocatable :: derivative(:, :)
@@ -81,7 +80,8 @@ contains
       associate (state => self%state)
          call new_rows(state, x, self%quantities, self%mu, self%wear_coefficient, &
                        self%wears_by_energy, self%rows)
-         self%linear%kind = merge(linear_lu, linear_krylov, state%n <= self%lu_up_to)
+         self%linear%kind = merge(linear_lu, linear_krylov, state%n <= merge( &
+            self%lu_up_to, sizes%lu_of_slopes, self%lu_up_to >= 0))
          self%linear%keeps = .false.
          ! The transposed problem takes the factors of the harmonics.
          state%nearly = .false.

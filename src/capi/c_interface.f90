@@ -8,7 +8,6 @@
 module fw_c_interface
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_funptr, &
       c_int, c_intptr_t, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
-   use fw_c_text, only: give_text, take_text
    use fw_calls, only: call_check, call_count, call_frequency, call_get, call_get_text, &
       call_load_file, call_load_text, call_message, call_new_model, call_observe, &
       call_put_integers, call_put_reals, call_refuse, call_run, call_set, call_size, call_solve, &
@@ -27,6 +26,18 @@ module fw_c_interface
    ! With its null, in static memory: the pointer stays valid as long as the library is loaded.
    character(kind=c_char, len=len(version) + 1), target :: version_text = &
       version//c_null_char
+
+   ! Texts between C and Fortran.
+   !
+   ! Letters are copied one by one: a Fortran text has no null at its end and a length of its own.
+
+   interface
+      integer(c_size_t) function c_strlen(text) bind(c, name='strlen')
+         import :: c_ptr, c_size_t
+         implicit none (type, external)
+         type(c_ptr), value :: text
+      end function c_strlen
+   end interface
 
 contains
 
@@ -391,5 +402,41 @@ contains
       ! The largest number stays as it is: adding 1 would overflow; there is no such point anyway.
       if (point < huge(point)) k = k + 1
    end function point_of
+
+   !> A copy of a text of C; not allocated for a null pointer.
+   subroutine take_text(pointer, text)
+      type(c_ptr), intent(in) :: pointer
+      character(:), allocatable, intent(out) :: text
+      character(kind=c_char), pointer :: letters(:)
+      integer(c_size_t) :: i, n
+
+      if (.not. c_associated(pointer)) return
+      n = c_strlen(pointer)
+      call c_f_pointer(pointer, letters, [n])
+      allocate (character(n) :: text)
+      do i = 1, n
+         text(i:i) = letters(i)
+      end do
+   end subroutine take_text
+
+   !> Copy a text to a buffer of C as far as it fits, always with a null at the end.
+   subroutine give_text(text, buffer, buffer_size)
+      !> Text of any length; it may hold nulls, which C will take for its end.
+      character(*), intent(in) :: text
+      !> Null, or a size of 0: only the length is of interest, and nothing is written.
+      type(c_ptr), intent(in) :: buffer
+      !> Letters of the buffer, the null included.
+      integer(c_size_t), intent(in) :: buffer_size
+      character(kind=c_char), pointer :: letters(:)
+      integer(c_size_t) :: i, n
+
+      if (.not. c_associated(buffer) .or. buffer_size < 1_c_size_t) return
+      call c_f_pointer(buffer, letters, [buffer_size])
+      n = min(len(text, c_size_t), buffer_size - 1_c_size_t)
+      do i = 1, n
+         letters(i) = text(i:i)
+      end do
+      letters(n + 1) = c_null_char
+   end subroutine give_text
 
 end module fw_c_interface

@@ -14,8 +14,8 @@ module fw_features
    use fw_laws, only: facts_of, is_viscous
    use fw_parameters, only: harmonic_scale, rotation_speed, static_scale
    use fw_resonance_options, only: condition_phase
-   use fw_solver_options, only: continuation_arclength, jacobian_analytic, scheme_bdf, &
-      scheme_implicit_euler, scheme_runge_kutta, solver_newton, solver_pseudo_time
+   use fw_solver_options, only: continuation_arclength, scheme_bdf, scheme_implicit_euler, &
+      scheme_runge_kutta, solver_newton, solver_pseudo_time
    use fw_wear_options, only: wear_pseudo_time
    implicit none (type, external)
    private
@@ -129,8 +129,6 @@ contains
          asked = case%harmonics%method /= method_hbm
       case ("harmonics%method = 'hdhb'")
          asked = case%harmonics%method == method_hdhb
-      case ('harmonics%adaptive = .true.')
-         asked = case%harmonics%adaptive
       case ('harmonics%accuracy')
          asked = case%harmonics%accuracy > 0.0_wp
       case ("harmonics%sampling = 'events'")
@@ -141,12 +139,8 @@ contains
          asked = case%solver%kind /= solver_newton
       case ("solver%kind = 'pseudo_time'")
          asked = case%solver%kind == solver_pseudo_time
-      case ("solver%jacobian = 'difference'")
-         asked = case%solver%jacobian /= jacobian_analytic
       case ('output%histories')
          asked = case%output%histories
-      case ('output%histories without harmonics%n_time')
-         asked = case%output%histories .and. case%harmonics%n_time == 0
       case ('output%tail')
          asked = case%output%tail > 0
       case default
@@ -170,7 +164,7 @@ contains
             asked = sweep%stability .and. case%analysis /= analysis_modes
          case ('sweep%refine = .true.')
             asked = sweep%refine
-         case ('sweep%first_point, last_point or lead_points')
+         case ('a piece of a sweep')
             asked = sweep%is_piece()
          case ('sweep%n_points = 1')
             asked = sweep%n_points < 2

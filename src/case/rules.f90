@@ -23,10 +23,8 @@ module fw_rules
    !> followed by Newton's method.
    type(rule_type), parameter :: of_modes(*) = [ &
       rule_type("case%analysis = 'mode'", "harmonics%method other than 'hbm'", "use 'hbm'"), &
-      rule_type("case%analysis = 'mode'", 'harmonics%adaptive = .true.', 'give n_harmonics'), &
       rule_type("case%analysis = 'mode'", 'harmonics%accuracy', 'give n_harmonics'), &
       rule_type("case%analysis = 'mode'", "solver%kind other than 'newton'", "use 'newton'"), &
-      rule_type("case%analysis = 'mode'", "solver%jacobian = 'difference'", "use 'analytic'"), &
       rule_type("case%analysis = 'mode'", "contact%memory = 'carried'", "use 'assembly'"), &
       rule_type("case%analysis = 'mode'", 'output%histories', 'leave it out'), &
       rule_type("case%analysis = 'mode'", 'output%tail', 'take more n_harmonics'), &
@@ -35,11 +33,8 @@ module fw_rules
       rule_type('mode%synthesis', 'a case without a load in harmonic 1 for the mode', &
                 'set load%cosine or load%sine'), &
       rule_type("case%analysis = 'resonance'", "harmonics%method other than 'hbm'", "use 'hbm'"), &
-      rule_type("case%analysis = 'resonance'", 'harmonics%adaptive = .true.', 'give n_harmonics'), &
       rule_type("case%analysis = 'resonance'", 'harmonics%accuracy', 'give n_harmonics'), &
       rule_type("case%analysis = 'resonance'", "solver%kind other than 'newton'", "use 'newton'"), &
-      rule_type("case%analysis = 'resonance'", "solver%jacobian = 'difference'", &
-                "use 'analytic'"), &
       rule_type("case%analysis = 'resonance'", "contact%memory = 'carried'", "use 'assembly'"), &
       rule_type("case%analysis = 'resonance'", 'output%histories', 'leave it out'), &
       rule_type("case%analysis = 'resonance'", 'output%tail', 'take more n_harmonics'), &
@@ -57,11 +52,6 @@ module fw_rules
 
    !> Points of a sweep stand by themselves, have one length, or are compared with each other.
    type(rule_type), parameter :: of_sweeps(*) = [ &
-      rule_type("solver%jacobian = 'difference'", "solver%kind = 'pseudo_time'", &
-                "use 'analytic'"), &
-      rule_type("solver%jacobian = 'difference'", "case%analysis = 'wear'", "use 'analytic'"), &
-      rule_type("solver%jacobian = 'difference'", "sweep%continuation = 'arclength'", &
-                "use 'analytic'"), &
       rule_type('sweep%stability = .true.', "case%analysis = 'time'", &
                 'what an integration comes to is stable by itself; leave it out'), &
       rule_type("contact%memory = 'carried'", "sweep%continuation = 'arclength'", &
@@ -71,25 +61,16 @@ module fw_rules
       rule_type('sweep%refine = .true.', "sweep%continuation = 'arclength'", 'leave it out'), &
       rule_type('sweep%refine = .true.', "contact%memory = 'carried'", &
                 'a point depends on those before; leave it out'), &
-      rule_type('sweep%first_point, last_point or lead_points', &
-                "case%analysis other than 'frf'", 'leave them out'), &
-      rule_type('sweep%first_point, last_point or lead_points', &
-                "sweep%continuation = 'arclength'", 'leave them out'), &
-      rule_type('sweep%first_point, last_point or lead_points', 'group &control', &
-                'leave them out'), &
-      rule_type('sweep%first_point, last_point or lead_points', "contact%memory = 'carried'", &
-                'a point depends on all those before; leave them out'), &
+      rule_type('a piece of a sweep', "case%analysis other than 'frf'", 'run it whole'), &
+      rule_type('a piece of a sweep', "sweep%continuation = 'arclength'", 'run it whole'), &
+      rule_type('a piece of a sweep', 'group &control', 'run it whole'), &
+      rule_type('a piece of a sweep', "contact%memory = 'carried'", &
+                'a point depends on all those before; run it whole'), &
       rule_type('sweep%parameter', 'group &sensitivity', &
                 'derivatives are those at the values of the case; leave one of the two out'), &
       rule_type('sweep%parameter', 'output%tail', 'take more n_harmonics'), &
       rule_type('sweep%parameter', 'sweep%refine = .true.', &
                 'no maxima are looked for; leave it out'), &
-      rule_type('harmonics%adaptive = .true.', "case%analysis other than 'frf' or 'point'", &
-                'use .false.'), &
-      rule_type('harmonics%adaptive = .true.', "sweep%continuation = 'arclength'", &
-                'use .false.'), &
-      rule_type('harmonics%adaptive = .true.', 'output%histories without harmonics%n_time', &
-                'give harmonics%n_time'), &
       rule_type('harmonics%accuracy', "case%analysis other than 'frf' or 'point'", &
                 'leave it out, and give n_harmonics'), &
       rule_type('harmonics%accuracy', "sweep%continuation = 'arclength'", &
@@ -109,9 +90,7 @@ module fw_rules
       rule_type('group &control', "sweep%parameter = 'load%static_scale' through 0", &
                 'sweep on one side of it'), &
       rule_type('group &control', "solver%kind other than 'newton'", "use 'newton'"), &
-      rule_type('group &control', "solver%jacobian = 'difference'", "use 'analytic'"), &
       rule_type('group &control', "harmonics%method = 'hdhb'", "use 'hbm'"), &
-      rule_type('group &control', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
       rule_type('group &control', 'harmonics%accuracy', 'give n_harmonics'), &
       rule_type('group &control', "contact%memory = 'carried'", "use 'assembly'"), &
       rule_type('group &control', 'sweep%refine = .true.', &
@@ -133,7 +112,6 @@ module fw_rules
       rule_type('group &sensitivity', "harmonics%method other than 'hbm'", "use 'hbm'"), &
       rule_type('group &sensitivity', "contact%memory = 'carried'", "use 'assembly'"), &
       rule_type('group &sensitivity', "solver%kind other than 'newton'", "use 'newton'"), &
-      rule_type('group &sensitivity', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
       rule_type('group &sensitivity', 'harmonics%accuracy', 'give n_harmonics')]
 
    !> What waves around a cyclic structure, and the motion of all its sectors, are not solved with.
@@ -142,7 +120,6 @@ module fw_rules
                 "case%analysis other than 'frf', 'point' or 'wear'", &
                 'use one of them, or leave mistuned out'), &
       rule_type('cyclic%mistuned = .true.', "harmonics%method other than 'hbm'", "use 'hbm'"), &
-      rule_type('cyclic%mistuned = .true.', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
       rule_type('cyclic%mistuned = .true.', 'harmonics%accuracy', &
                 'give n_harmonics (left out, an accuracy chooses them), as many as a run of '// &
                 'the tuned wave reports'), &
@@ -165,7 +142,6 @@ module fw_rules
       rule_type('output%tail', 'a law without forces above the harmonics of the balance', &
                 "use contact%law = 'rigid'"), &
       rule_type('output%tail', 'pairs with two tangential directions', 'leave it out'), &
-      rule_type('output%tail', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
       rule_type('output%tail', 'harmonics%accuracy', 'give n_harmonics'), &
       rule_type('output%tail', "sweep%continuation = 'arclength'", 'leave it out'), &
       rule_type('output%tail', "case%analysis other than 'frf' or 'point'", 'leave it out'), &

@@ -27,6 +27,7 @@
 !> is: it is the same friction, and its tail is the right one.
 module fw_accuracy
    use, intrinsic :: iso_fortran_env, only: int64
+   use fw_accuracy_options, only: limits
    use fw_case, only: case_type
    use fw_claim_counts, only: claim_counts
    use fw_error, only: error_type
@@ -49,41 +50,8 @@ module fw_accuracy
 
    public :: accuracy_solver
 
-   !> Factor of the changes that bounds the error, and the part of |u2 - u| that counts at least.
-   real(wp), parameter :: factor_of_tail = 3.0_wp, least_part = 0.2_wp
-   !> |u2 - u| above which nothing is claimed, and from which on u2 is no better than u.
-   real(wp), parameter :: linear_up_to = 0.1_wp, better_below = 0.03_wp
-   !> Part of |u2 - u| that the next change may be, unless both are round-off.
-   real(wp), parameter :: contraction = 0.5_wp, round_off = 1.0e-9_wp
-   !> Harmonics up to which rigid pairs that are no oscillators may stick where they should slip.
-   integer, parameter :: few_harmonics = 5
-   !> Part of the last step that bounds what their next ones come to, see last_step.
-   real(wp), parameter :: part_of_step = 0.5_wp
-   !> What |u2 - u| is multiplied by where solutions are compared: as it converges, or does not.
-   real(wp), parameter :: factor_seen = 2.0_wp, factor_seen_only = 3.0_wp
-   !> Order of the error in 1/H, where the tail does not tell: elastic contact and springs; rigid
-   !> contact on nodes that answer as if they had no mass, and on others.
-   real(wp), parameter :: order_elastic = 1.5_wp, order_massless = 1.25_wp, order_rigid = 0.3_wp
-   !> Factors that the order must not go below: with few harmonics no order shows yet; and the
-   !> fewest that a solution is compared with where friction acts on mass.
-   integer, parameter :: few_for_order = 5, fewest_on_mass = 3
-   real(wp), parameter :: least_factor = 1.0_wp/3.0_wp, least_factor_of_few = 1.0_wp
-   !> What half of the instants changes is multiplied by this where they decide: first order, and
-   !> fluctuating. Located events leave no error of theirs.
-   real(wp), parameter :: factor_instants = 2.0_wp
-   !> How much more instants may leave out at one point than at others.
-   real(wp), parameter :: safety = 8.0_wp
-   !> Halvings and doublings of the instants that are tried.
-   integer, parameter :: fewest = -1, most = 5
-   !> Levels at which a point may fail before it is given up.
-   integer, parameter :: most_failures = 1
-   !> Iterations on finer levels after which no finer one is begun: in any case, and where errors
-   !> that fall like H**(-fastest) would not come to the accuracy. (Of 1,000 random points three
-   !> took more than 200 to a claim, and those that took more than 260 made none.)
-   integer, parameter :: most_work = 250, much_work = 100
-   real(wp), parameter :: fastest = 6.0_wp
-   !> Harmonics or instants are given up where the error is this part of the accuracy.
-   real(wp), parameter :: with_margin = 1.0_wp/8.0_wp
+   !> Halvings of the instants that are tried, below 0; doublings are in `limits`.
+   integer, parameter :: fewest = -1
 
    type, extends(point_strategy) :: accuracy_solver
       !> Numbers of harmonics to choose from, ascending.
@@ -128,10 +96,11 @@ contains
 
       self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics, &
                                          case%model%waves%highest())
-      allocate (self%level(size(self%n_harmonics), fewest:most))
-      allocate (self%tail(size(self%n_harmonics), fewest:most))
-      allocate (self%by_instants(size(self%n_harmonics), fewest:most), source=unknown/safety)
-      if (case%contact%n_pairs > 0) self%factor_time = factor_instants
+      allocate (self%level(size(self%n_harmonics), fewest:limits%most_doublings))
+      allocate (self%tail(size(self%n_harmonics), fewest:limits%most_doublings))
+      allocate (self%by_instants(size(self%n_harmonics), fewest:limits%most_doublings), &
+                source=unknown/limits%safety)
+      if (case%contact%n_pairs > 0) self%factor_time = limits%factor_instants
       self%case = case
       self%case%contact%law = law_under_accuracy(case%contact, &
                                                  case%harmonics%sampling == sampling_uniform)
@@ -200,11 +169,11 @@ contains
             failures = failures + 1
             if (best%converged) call self%counts%note_left(request%omega, iterations, &
                                                            self%n_harmonics(self%current))
-            if (best%converged .or. failures > most_failures) exit
+            if (best%converged .or. failures > limits%most_failures) exit
          end if
          if (best%converged .and. case%solver%kind == solver_newton) then
             if (first < 0) first = iterations
-            asked%most_work = first + most_work - iterations
+            asked%most_work = first + limits%most_work - iterations
             if (is_left(self, errors(1), iterations - first)) then
                call self%counts%note_left(request%omega, iterations, &
                                           self%n_harmonics(self%current))
@@ -243,10 +212,10 @@ contains
       integer, intent(in) :: work
       real(wp) :: nearest
 
-      is_left = work >= most_work
-      if (is_left .or. work < much_work) return
+      is_left = work >= limits%most_work
+      if (is_left .or. work < limits%much_work) return
       nearest = (real(self%n_harmonics(self%current), wp)/ &
-                 real(maxval(self%n_harmonics), wp))**fastest*min(error, self%change)
+                 real(maxval(self%n_harmonics), wp))**limits%fastest*min(error, self%change)
       is_left = nearest > self%case%harmonics%accuracy .and. nearest < sqrt(unknown)
    end function is_left
 
@@ -298,7 +267,7 @@ contains
             if (is_solved(level, self%asked%place())) bound = self%factor_time* &
                relative_distance(point%coefficients, level%coefficients)
          end associate
-         known = min(bound, unknown/safety)
+         known = min(bound, unknown/limits%safety)
       end associate
    end subroutine bound_by_instants
 
@@ -331,30 +300,30 @@ contains
          self%change = change
          ! The tails of coupled directions do not contract for sure: they tell, and bound nothing.
          told = .not. self%planar
-         if (.not. change <= linear_up_to) then
+         if (.not. change <= limits%linear_up_to) then
             seen = change
             return
          end if
          call tail%next_change(level%system, next)
-         if (next > max(contraction*change, round_off)) then
-            seen = factor_seen_only*max(tail%distance_from(point%coefficients), next)
+         if (next > max(limits%contraction*change, limits%round_off)) then
+            seen = limits%factor_seen_only*max(tail%distance_from(point%coefficients), next)
             ! Rigid pairs may find other states of stick and slip with more harmonics.
             told = told .and. is_rigid(self%case%contact) .and. self%case%contact%n_pairs > 0
             return
          end if
-         seen = factor_seen*tail%distance_from(point%coefficients)
+         seen = limits%factor_seen*tail%distance_from(point%coefficients)
          if (.not. told) return
          if (.not. all_know_tails(level%system) .and. &
-             level%harmonics%n_harmonics <= few_harmonics) return
-         tail%is_better = change <= better_below
+             level%harmonics%n_harmonics <= limits%few_harmonics) return
+         tail%is_better = change <= limits%better_below
          if (tail%is_better) then
-            bound = factor_of_tail*max(next, least_part*change) &
+            bound = limits%factor_of_tail*max(next, limits%least_part*change) &
                     + tail%left_above(self%case%harmonics%n_harmonics)
          else
-            bound = factor_of_tail*tail%distance_from(point%coefficients)
+            bound = limits%factor_of_tail*tail%distance_from(point%coefficients)
          end if
          if (is_rigid(self%case%contact) .and. .not. all_know_tails(level%system)) then
-            bound = max(bound, part_of_step*last_step(self, point))
+            bound = max(bound, limits%part_of_step*last_step(self, point))
          end if
       end associate
    end subroutine bound_by_tail
@@ -391,15 +360,15 @@ contains
       integer :: k
 
       bound = unknown
-      order = order_elastic
+      order = limits%order_elastic
       if (is_rigid(self%case%contact)) then
-         order = order_rigid
+         order = limits%order_rigid
          if (is_like_structure(self%level(self%current, self%doublings)%system)) then
-            order = order_massless
+            order = limits%order_massless
          end if
       end if
       do k = max(1, self%current - 2), self%current - 1
-         if (order <= order_rigid .and. self%n_harmonics(k) < fewest_on_mass) cycle
+         if (order <= limits%order_rigid .and. self%n_harmonics(k) < limits%fewest_on_mass) cycle
          call check(self, k, self%doublings, iterations, error)
          if (allocated(error)) return
          if (.not. is_solved(self%level(k, self%doublings), self%asked%place())) cycle
@@ -425,7 +394,7 @@ contains
       integer :: k
       logical :: known
 
-      known = self%n_harmonics(self%current) > few_harmonics .and. self%current > 2
+      known = self%n_harmonics(self%current) > limits%few_harmonics .and. self%current > 2
       do k = self%current - 1, max(self%current - 2, 1), -1
          if (.not. known) exit
          call check(self, k, self%doublings, iterations, error)
@@ -438,7 +407,7 @@ contains
             before = relative_distance(finer, &
                                        self%level(self%current - 2, self%doublings)%coefficients)
          end associate
-         if (last <= round_off) return
+         if (last <= limits%round_off) return
          known = last < before
       end if
       if (known) bound = max(bound, last*last/(before - last))
@@ -498,7 +467,8 @@ contains
       real(wp), intent(in) :: order
 
       factor = 1.0_wp/((real(fine, wp)/real(coarse, wp))**order - 1.0_wp)
-      factor = max(factor, merge(least_factor_of_few, least_factor, fine <= few_for_order))
+      factor = max(factor, merge(limits%least_factor_of_few, limits%least_factor, &
+                                 fine <= limits%few_for_order))
    end function factor_harmonics
 
    !> Sum of estimates, of which one may be unknown.
@@ -519,7 +489,7 @@ contains
 
       ! Either of both may take half of what is allowed.
       more = errors > 0.5_wp*self%case%harmonics%accuracy
-      possible = [self%current < size(self%n_harmonics), self%doublings < most]
+      possible = [self%current < size(self%n_harmonics), self%doublings < limits%most_doublings]
       finer = all(possible .or. .not. more)
       if (finer) call move(self, self%current + merge(1, 0, more(1)), &
                            self%doublings + merge(1, 0, more(2)), error)
@@ -533,7 +503,7 @@ contains
       logical :: less(2)
 
       ! Down to the second number, which still has one below to be compared with.
-      less = errors <= with_margin*self%case%harmonics%accuracy .and. &
+      less = errors <= limits%with_margin*self%case%harmonics%accuracy .and. &
              [self%current > 2, self%doublings > 0]
       if (any(less)) call move(self, self%current - merge(1, 0, less(1)), &
                                self%doublings - merge(1, 0, less(2)), error)
@@ -564,7 +534,7 @@ contains
       type(linear_step_type) :: work
       integer :: j, k
 
-      do j = fewest, most
+      do j = fewest, limits%most_doublings
          do k = 1, size(self%n_harmonics)
             call work%add_work(self%tail(k, j)%linear)
          end do

@@ -2,7 +2,6 @@
 !> its branch.
 module fw_frequency_response
    use fw_accuracy, only: accuracy_solver
-   use fw_adaptive, only: adaptive_solver
    use fw_analysis, only: analysis, run_type
    use fw_branch, only: branch_source
    use fw_bifurcation, only: bifurcation_list
@@ -291,8 +290,6 @@ contains
          allocate (walked)
          allocate (given_amplitude :: walked%v)
          call move_alloc(walked, strategy)
-      else if (case%harmonics%adaptive) then
-         allocate (adaptive_solver :: strategy)
       else if (case%harmonics%accuracy > 0.0_wp) then
          allocate (accuracy_solver :: strategy)
       else

@@ -3,7 +3,7 @@
 module fw_hidden_resonance
    use fw_joint_modes, only: joint_mode_type, state_free, state_sliding, state_stuck
    use fw_kinds, only: pi, wp
-   use fw_peak_rules, only: negligible
+   use fw_peak_options, only: limits
    use fw_samples, only: phase_step, sample_type
    implicit none (type, external)
    private
@@ -44,7 +44,7 @@ contains
 
       ! What is round-off beside the other quantities has no phase.
       turns_back = min(below%first(i), above%first(i)) > &
-                   negligible*max(maxval(below%first), maxval(above%first)) .and. &
+                   limits%negligible*max(maxval(below%first), maxval(above%first)) .and. &
                    phase_step(below, above, i) < -turn
    end function turns_back
 

@@ -11,6 +11,7 @@
 !> |u2 - u| estimates the error of u, and u2 is the better answer. The same again, from u2, tells
 !> whether this converges: where it does not, neither is worth anything.
 module fw_known_tail
+   use fw_accuracy_options, only: limits
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_harmonics_options, only: harmonics_options
@@ -32,12 +33,6 @@ module fw_known_tail
 
    !> Where nothing is known.
    real(wp), parameter :: unknown = huge(1.0_wp)
-   !> Harmonics of the tail: factor*H + few, but no more than twice as many as H above `most`.
-   integer, parameter :: times = 4, few = 8, most = 128
-   !> Residual asked of an iterative solution: a part of the correction that nobody sees.
-   real(wp), parameter :: linear_tolerance = 1.0e-4_wp
-   !> Quantities that vibrate less than this part of the largest are measured against that part.
-   real(wp), parameter :: least_vibration = 1.0e-3_wp
 
    type :: known_tail
       !> The balance of N harmonics, evaluated and never solved; its unknowns.
@@ -115,7 +110,7 @@ contains
       n = harmonics%n_harmonics
       self%n_kept = n
       finer = harmonics
-      self%n_total = min(times*n + few, max(most, 2*n))
+      self%n_total = min(limits%tail_times*n + limits%tail_more, max(limits%tail_most, 2*n))
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
          at_instants = law%n_elements > 0 .and. .not. law%facts%follows_events
       end associate
@@ -151,7 +146,7 @@ contains
       if (.not. self%finer%work(self%problem%forces%pairs)%all_periodic()) return
       allocate (r(system%n), step(system%n))
       call carry_solution(self%finer, self%r, system, r)
-      call self%linear%solve_prepared(system, r, linear_tolerance, step, done)
+      call self%linear%solve_prepared(system, r, limits%linear_tolerance, step, done)
       if (.not. done) return
       self%coarse = self%coarse + step
       call answer_above(self, done)
@@ -204,7 +199,6 @@ contains
    pure real(wp) function left_above(self, n_harmonics) result(left)
       class(known_tail), intent(in) :: self
       integer, intent(in) :: n_harmonics
-      real(wp), parameter :: falls_to = 0.25_wp
       real(wp) :: vibration(size(self%coefficients, 2)), power
       integer :: first, i, octave
 
@@ -215,10 +209,10 @@ contains
          vibration(i) = norm2(self%coefficients(2:, i))
       end do
       if (maxval([vibration, 0.0_wp]) <= 0.0_wp) return
-      vibration = max(vibration, least_vibration*maxval(vibration))
+      vibration = max(vibration, limits%least_vibration*maxval(vibration))
       do i = 1, size(vibration)
          power = sum(self%coefficients(first:, i)**2) &
-                 + falls_to/(1.0_wp - falls_to)*sum(self%coefficients(octave:, i)**2)
+                 + limits%falls_to/(1.0_wp - limits%falls_to)*sum(self%coefficients(octave:, i)**2)
          left = max(left, sqrt(power)/vibration(i))
       end do
    end function left_above
@@ -346,7 +340,6 @@ contains
    !> keeps its tail as it is.
    logical function is_like_structure(system) result(is_like)
       type(balance_state), intent(in) :: system
-      real(wp), parameter :: within = 2.0_wp
       real(wp) :: c, k, m, ratio, s
       integer :: component, h, i, n_alike, n_all
 
@@ -373,7 +366,9 @@ contains
                call system%problem%structure%split(system%problem%coordinate_of(component, i), &
                                            (h + 1)*system%frequency(), m, c, k)
                ratio = (k - s**2*m)/p%stiffness(i, component)
-               if (ratio > 1.0_wp/within .and. ratio < within) n_alike = n_alike + 1
+               if (ratio > 1.0_wp/limits%alike_within .and. ratio < limits%alike_within) then
+                  n_alike = n_alike + 1
+               end if
             end do
          end do
       end associate
@@ -413,7 +408,7 @@ contains
          vibration(i) = norm2(fine(2:, i))
       end do
       if (maxval([vibration, 0.0_wp]) <= 0.0_wp) return
-      vibration = max(vibration, least_vibration*maxval(vibration))
+      vibration = max(vibration, limits%least_vibration*maxval(vibration))
       do i = 1, size(fine, 2)
          change(:n) = fine(:n, i) - coarse(:, i)
          change(n + 1:) = fine(n + 1:, i)

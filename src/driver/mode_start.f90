@@ -14,6 +14,7 @@ module fw_mode_start
    use fw_mode_system, only: mode_system, new_mode_system
    use fw_newton, only: newton_solver, solver_report
    use fw_problem, only: build_system
+   use fw_size_options, only: sizes
    use fw_solver_options, only: linear_lu
    use fw_structure_operator, only: structure_state
    use fw_stuck_modes, only: find_stuck_modes, stuck_modes
@@ -52,9 +53,6 @@ module fw_mode_start
       procedure :: build
    end type mode_start
 
-   !> Unknowns of a dense factorization that takes seconds and below 1 GB; both grow fast. Dofs
-   !> whose linear modes take as long.
-   integer, parameter :: most_unknowns = 6000, most_dofs = 3000
    !> Part of its size below which a mode has a node.
    real(wp), parameter :: node = 1.0e-8_wp
    !> Residual of the position at rest: the first guess of the curve, not its result.
@@ -134,9 +132,9 @@ contains
       end if
       n = real(m, wp)
       nh = real(case%harmonics%n_harmonics + 1, wp)
-      if (m > most_dofs) then
+      if (m > sizes%dofs_of_mode) then
          call fatal_error(error, "case%analysis = 'mode' condenses nothing: the model has "// &
-                          to_text(m)//' dofs, '//to_text(most_dofs)// &
+                          to_text(m)//' dofs, '//to_text(sizes%dofs_of_mode)// &
                           ' at most; reduce it (fretwear reduce)', status_input)
          return
       end if
@@ -171,10 +169,11 @@ contains
                           "linear structure take 'modes'", status_input)
          return
       end if
-      if (self%case%solver%linear == linear_lu .and. self%balance%n > most_unknowns) then
+      if (self%case%solver%linear == linear_lu .and. self%balance%n > sizes%unknowns_of_mode) then
          call fatal_error(error, "solver%linear = 'lu' with case%analysis = 'mode' factors a "// &
                           'dense matrix of all unknowns: '//to_text(self%balance%n)//' here, '// &
-                          to_text(most_unknowns)//" at most; leave it to 'auto'", status_input)
+                          to_text(sizes%unknowns_of_mode)// &
+                          " at most; leave it to 'auto'", status_input)
          return
       end if
       allocate (x(self%balance%n), source=0.0_wp)

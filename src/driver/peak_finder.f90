@@ -16,6 +16,7 @@ module fw_peak_finder
    use fw_mixed_bands, only: find_bands, mixed_band, opens
    use fw_peak, only: peak_type
    use fw_peak_gaps, only: gap_list
+   use fw_peak_options, only: limits
    use fw_peak_rules, only: find_edge, find_gap, find_next, find_way_past, highest_of, is_bound, &
       is_maximum, list_peaks, place_of_highest
    use fw_point, only: point_type
@@ -28,18 +29,6 @@ module fw_peak_finder
    private
 
    public :: peak_finder
-
-   !> Solutions for the resonance of an interval, and failures next to a maximum that end its
-   !> search; each halves the way that is tried.
-   integer, parameter :: most_trials = 6, most_failures = 5
-   !> Solutions of a search in all: so many, or this part of the rows, but no more than the last.
-   integer, parameter :: least_budget = 80, budget_share = 20, most_budget = 200
-   !> Part of the first interval at which it is seen whether the amplitude rises into the range.
-   real(wp), parameter :: step_inside = 0.1_wp
-   !> Samples from which on those far from maxima are thinned out: long sweeps need no more memory.
-   integer, parameter :: most_samples = 128
-   !> Neighbouring samples, relative.
-   real(wp), parameter :: same_frequency = 1.0e-7_wp
 
    !> An interval between two rows [rad/s].
    type :: interval_type
@@ -153,7 +142,8 @@ contains
       self%n_following = self%n_following + 1
       ! Two neighbours without a failure between them, which says nothing of the interval.
       if (self%in_order .and. self%n_following >= 2) call look_back(self, place)
-      if (modulo(self%n_rows, most_samples) == 0 .and. self%samples%n >= most_samples) then
+      if (modulo(self%n_rows, limits%most_samples) == 0 .and. &
+          self%samples%n >= limits%most_samples) then
          call self%samples%thin()
       end if
    end subroutine take
@@ -162,16 +152,14 @@ contains
    pure logical function is_known(samples, sample)
       type(sample_list), intent(in) :: samples
       type(sample_type), intent(in) :: sample
-      !> Solutions of one point from two guesses, both within the tolerance.
-      real(wp), parameter :: same_amplitude = 1.0e-6_wp
       integer :: k
 
       is_known = .false.
       do k = 1, samples%n
          associate (other => samples%item(k)%at)
-            if (abs(other%omega - sample%omega) > same_frequency*sample%omega) cycle
+            if (abs(other%omega - sample%omega) > limits%same_frequency*sample%omega) cycle
             is_known = is_known .or. all(abs(other%amplitude - sample%amplitude) <= &
-                                         same_amplitude*maxval(sample%amplitude))
+                                         limits%same_amplitude*maxval(sample%amplitude))
          end associate
       end do
    end function is_known
@@ -261,8 +249,6 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: budget
       type(error_type), allocatable, intent(out) :: error
-      !> Of the way to the neighbours: nearer to the sample, from whose solution they go on.
-      real(wp), parameter :: part = 0.45_wp
       real(wp), allocatable :: highest(:)
       real(wp) :: omega(2*self%samples%n)
       integer :: k, n
@@ -273,8 +259,8 @@ contains
       do k = 2, self%samples%n - 1
          if (.not. is_bulge(self, k, highest)) cycle
          associate (item => self%samples%item)
-            omega(n + 1) = item(k)%at%omega - part*(item(k)%at%omega - item(k - 1)%at%omega)
-            omega(n + 2) = item(k)%at%omega + part*(item(k + 1)%at%omega - item(k)%at%omega)
+            omega(n + 1) = item(k)%at%omega - limits%part*(item(k)%at%omega - item(k - 1)%at%omega)
+            omega(n + 2) = item(k)%at%omega + limits%part*(item(k + 1)%at%omega - item(k)%at%omega)
          end associate
          n = n + 2
       end do
@@ -289,8 +275,6 @@ contains
       type(peak_finder), intent(in) :: self
       integer, intent(in) :: k
       real(wp), intent(in) :: highest(:)
-      !> How far above the line, relative.
-      real(wp), parameter :: least = 0.03_wp
       real(wp) :: line(size(highest)), share
       integer :: i, j
       logical :: is_near
@@ -306,12 +290,12 @@ contains
                                     any(self%bands(j)%height > highest))
          end do
          if (.not. is_near) return
-         if (above%omega - below%omega <= same_frequency*above%omega) return
+         if (above%omega - below%omega <= limits%same_frequency*above%omega) return
          if (any([(is_maximum(self%samples, k - 1, i) .or. is_maximum(self%samples, k, i) .or. &
                    is_maximum(self%samples, k + 1, i), i=1, size(highest))])) return
          share = (at%omega - below%omega)/(above%omega - below%omega)
          line = below%amplitude + share*(above%amplitude - below%amplitude)
-         is_bulge = any(at%amplitude > (1.0_wp + least)*line)
+         is_bulge = any(at%amplitude > (1.0_wp + limits%bulge)*line)
       end associate
    end function is_bulge
 
@@ -349,7 +333,7 @@ contains
       ! There a point depends on those before, or takes too long.
       if (case%contact%memory == memory_carried .or. analyses(case%analysis)%is_integrated) return
       if (.not. self%in_order) call suspect_all(self)
-      budget = min(max(least_budget, self%n_rows/budget_share), most_budget)
+      budget = min(max(limits%least_budget, self%n_rows/limits%budget_share), limits%most_budget)
       ! In the order of what they may find: resonances that no row shows, ends of the range,
       ! summits of maxima that rows show, and last the widths, which change no maximum.
       do k = 1, size(self%suspects)
@@ -394,8 +378,8 @@ contains
          end associate
       end do
       associate (item => self%samples%item)
-         omega(1) = item(1)%at%omega + step_inside*(item(2)%at%omega - item(1)%at%omega)
-         omega(2) = item(n)%at%omega + step_inside*(item(n - 1)%at%omega - item(n)%at%omega)
+         omega(1) = item(1)%at%omega + limits%step_inside*(item(2)%at%omega - item(1)%at%omega)
+         omega(2) = item(n)%at%omega + limits%step_inside*(item(n - 1)%at%omega - item(n)%at%omega)
       end associate
       do side = 1, 2
          if (.not. is_high(side)) cycle
@@ -426,7 +410,7 @@ contains
          if (allocated(error)) return
       end do
       ! Then where the phase turns: each solution divides the interval, or shows the maximum.
-      do trial = 1, most_trials
+      do trial = 1, limits%most_trials
          call find_turn(self, suspect, omega, found)
          if (.not. found) exit
          call solve_at(self, case, omega, budget, error)
@@ -446,7 +430,7 @@ contains
          associate (below => self%samples%item(k)%at, above => self%samples%item(k + 1)%at)
             if (below%omega >= omega .or. above%omega <= omega) cycle
             is_open = hides_mode(mode, below, above) .and. &
-                      min(omega - below%omega, above%omega - omega) > same_frequency*omega
+                      min(omega - below%omega, above%omega - omega) > limits%same_frequency*omega
          end associate
       end do
    end function is_open
@@ -463,7 +447,7 @@ contains
       do k = 1, self%samples%n - 1
          associate (below => self%samples%item(k)%at, above => self%samples%item(k + 1)%at)
             if (below%omega < suspect%below .or. above%omega > suspect%above) cycle
-            if (above%omega - below%omega <= same_frequency*above%omega) cycle
+            if (above%omega - below%omega <= limits%same_frequency*above%omega) cycle
             do i = 1, size(below%amplitude)
                found = turns_back(below, above, i) .and. .not. is_maximum(self%samples, k, i) &
                        .and. .not. is_maximum(self%samples, k + 1, i)
@@ -501,7 +485,6 @@ contains
       integer, intent(in) :: budget
       type(error_type), allocatable, intent(out) :: error
       ! A first solution between the peak and a sample behind another mode may miss the edge.
-      integer, parameter :: most_looks = 2
       real(wp) :: omega
       integer :: i, k, side, look
       logical :: found, known
@@ -509,7 +492,7 @@ contains
       if (self%samples%n < 3) return
       do i = 1, size(self%samples%item(1)%at%amplitude)
          do side = -1, 1, 2
-            do look = 1, most_looks
+            do look = 1, limits%looks_at_edge
                ! Found anew, for a solution moves the places.
                k = place_of_highest(self%samples, i)
                if (.not. is_maximum(self%samples, k, i)) exit
@@ -536,13 +519,13 @@ contains
       more = .false.
       if (self%samples%n < 3) return
       do i = 1, size(self%samples%item(1)%at%amplitude)
-         do trial = 1, most_trials
+         do trial = 1, limits%most_trials
             k = place_of_highest(self%samples, i)
             if (.not. is_maximum(self%samples, k, i) .or. self%n_solved >= budget) exit
             call find_gap(self%samples, k, i, omega, from, found)
             if (.not. found) exit
             associate (at => self%samples%item(from)%at)
-               if (at%n_failed >= most_failures) exit
+               if (at%n_failed >= limits%most_failures) exit
                omega = at%omega + (omega - at%omega)*0.5_wp**at%n_failed
             end associate
             call solve_at(self, case, omega, budget, error, from)
@@ -561,8 +544,6 @@ contains
       !> Set where a peak goes on.
       logical, intent(inout) :: more
       type(error_type), allocatable, intent(out) :: error
-      real(wp), parameter :: goes_on = 0.9_wp, nearer = 0.3_wp
-      integer, parameter :: most_looks = 3
       real(wp) :: omega, edge, height, way
       integer :: i, k, look, side
       logical :: found
@@ -574,18 +555,18 @@ contains
          if (.not. is_maximum(self%samples, k, i)) cycle
          call find_way_past(self%samples, k, i, side, omega, found)
          if (.not. found) cycle
-         height = goes_on*self%samples%item(k)%at%amplitude(i)
+         height = limits%goes_on*self%samples%item(k)%at%amplitude(i)
          self%samples%item(side)%at%is_edge = .true.
          edge = self%samples%item(side)%at%omega
          way = omega - edge
-         do look = 1, most_looks
+         do look = 1, limits%looks_behind
             call solve_at(self, case, edge + way, budget, error, place_of_highest(self%samples, i))
             if (allocated(error)) return
             call leave_edge(self, edge, edge + way, height, i, found)
             more = more .or. found
             if (found) exit
             ! The branch may end sooner.
-            way = nearer*way
+            way = limits%nearer*way
          end do
       end do
    end subroutine look_past
@@ -636,7 +617,7 @@ contains
          if (.not. highest > 0.0_wp) cycle
          do k = 2, self%samples%n - 1
             if (.not. is_maximum(self%samples, k, i)) cycle
-            if (self%samples%item(k)%at%n_failed >= most_failures) cycle
+            if (self%samples%item(k)%at%n_failed >= limits%most_failures) cycle
             call find_next(self%samples, k, i, candidate, promise, done)
             ! A promise without height is `huge`, and would overflow.
             share = min(promise, endless*highest)/highest

@@ -3,17 +3,12 @@
 module fw_peak_gaps
    use fw_kinds, only: wp
    use fw_mixed_bands, only: hidden_points, mixed_band, opens
+   use fw_peak_options, only: limits
    use fw_samples, only: sample_list, sample_type
    implicit none (type, external)
    private
 
    public :: gap_list
-
-   !> How far the flank of such a resonance should stand out of the rows.
-   real(wp), parameter :: stands_out = 5.0_wp
-   !> Rows per point, but for so many points at least; how the points are made fewer until they fit.
-   integer, parameter :: rows_per_point = 4, least_points = 10
-   real(wp), parameter :: fewer = 0.8_wp
 
    type :: gap_type
       !> Between two rows [rad/s].
@@ -49,7 +44,7 @@ contains
       integer :: k
 
       call hidden_points(bands, below, above, length, height)
-      if (length*stands_out <= 1.0_wp) return
+      if (length*limits%stands_out <= 1.0_wp) return
       below%is_needed = .true.
       above%is_needed = .true.
       if (.not. allocated(self%item)) allocate (self%item(8))
@@ -82,7 +77,7 @@ contains
       integer, intent(in) :: n_rows, n_most
       integer :: k, left
 
-      left = max(0, min(max(least_points, n_rows/rows_per_point), n_most))
+      left = max(0, min(max(limits%least_points, n_rows/limits%rows_per_point), n_most))
       call share(self, highest, .true., left)
       do k = 1, samples%n
          if (.not. opens(samples%item(k)%at)) cycle
@@ -100,7 +95,7 @@ contains
       real(wp) :: wanted
       integer :: k, total
 
-      wanted = stands_out
+      wanted = limits%stands_out
       do
          total = 0
          do k = 1, self%n
@@ -115,7 +110,7 @@ contains
             end associate
          end do
          if (total <= left) exit
-         wanted = fewer*wanted
+         wanted = limits%fewer*wanted
       end do
       left = left - total
    end subroutine share

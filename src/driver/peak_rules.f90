@@ -3,32 +3,13 @@
 module fw_peak_rules
    use fw_kinds, only: wp
    use fw_peak, only: found_bound, found_jump, found_row, found_search, found_unresolved, peak_type
+   use fw_peak_options, only: limits
    use fw_samples, only: position_of, sample_list, sample_type, swing_of, vertex_of
    implicit none (type, external)
    private
 
    public :: is_maximum, is_bound, highest_of, place_of_highest
-   public :: find_next, find_edge, find_gap, find_way_past, negligible, list_peaks
-
-   !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
-   real(wp), parameter :: round_off = 1.0e-7_wp
-   !> The same of quantities that hardly move, as a part of the largest one.
-   real(wp), parameter :: negligible = 1.0e-11_wp
-   !> A peak is known where the parabola promises no more than this, relative.
-   real(wp), parameter :: small_gain = 1.0e-4_wp
-   !> A neighbour of at least this part of the height belongs to the peak: what is left of the
-   !> parabola, of third order in the distance, is below the gain there. And the same of a peak that
-   !> may be the highest: three points of two peaks side by side look like one.
-   real(wp), parameter :: near = 0.9_wp, nearest = 0.97_wp
-   !> The same of a peak that is cut off: it is no parabola towards that side.
-   real(wp), parameter :: nearest_cut = 0.995_wp
-   !> A fall to this part of the height, over a way so many times as long as what is known of the
-   !> peak, may hide more of it.
-   real(wp), parameter :: deep = 0.5_wp, far_beyond = 8.0_wp
-   !> Samples closer than this, relative, are one frequency.
-   real(wp), parameter :: same_frequency = 1.0e-7_wp
-   !> Part of an interval that is kept between samples.
-   real(wp), parameter :: margin = 0.02_wp
+   public :: find_next, find_edge, find_gap, find_way_past, list_peaks
 
 contains
 
@@ -54,7 +35,8 @@ contains
       integer, intent(in) :: k, i
 
       associate (at => samples%item(k)%at)
-         rise = max(round_off*swing_of(at, i, at%mean(i)), negligible*maxval(at%amplitude))
+         rise = max(limits%round_off*swing_of(at, i, at%mean(i)), &
+                    limits%negligible*maxval(at%amplitude))
       end associate
    end function rise_of
 
@@ -114,26 +96,26 @@ contains
       real(wp) :: curvature, vertex, share, mean
       logical :: left_is_known, right_is_known, is_high
 
-      share = near
-      is_high = samples%item(k)%at%amplitude(i) >= near*highest_of(samples, i)
-      if (is_high) share = nearest
+      share = limits%near
+      is_high = samples%item(k)%at%amplitude(i) >= limits%near*highest_of(samples, i)
+      if (is_high) share = limits%nearest
       associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
                  right => samples%item(k + 1)%at)
          call vertex_of(left, middle, right, i, vertex, promise, curvature)
          mean = position_of(left, middle, right, i)
-         if (is_cut_off(samples, k, i, mean)) share = nearest_cut
+         if (is_cut_off(samples, k, i, mean)) share = limits%nearest_cut
          left_is_known = side_is_known(left, middle, right, i, mean, share)
          right_is_known = side_is_known(right, middle, left, i, mean, share)
          ! A side that is not far below is one of the parabola.
          if (min(swing_of(left, i, mean), swing_of(right, i, mean)) < &
-             near*swing_of(middle, i, mean) .and. (left_is_known .neqv. right_is_known)) then
+             limits%near*swing_of(middle, i, mean) .and. (left_is_known .neqv. right_is_known)) then
             vertex = further(samples, k, i, merge(1, -1, left_is_known), vertex)
          end if
          omega = within(vertex, left%omega, middle%omega, right%omega)
-         done = promise <= (1.0_wp + small_gain)*swing_of(middle, i, mean)
+         done = promise <= (1.0_wp + limits%small_gain)*swing_of(middle, i, mean)
          if (.not. done) then
             ! A vertex next to the middle tells nothing where a neighbour is far below.
-            done = abs(omega - middle%omega) <= same_frequency*middle%omega
+            done = abs(omega - middle%omega) <= limits%same_frequency*middle%omega
             if (.not. done) return
          end if
          done = left_is_known .and. right_is_known
@@ -146,7 +128,7 @@ contains
          else
             omega = beside(right, middle, i, mean, curvature, share)
          end if
-         done = abs(omega - middle%omega) <= same_frequency*middle%omega
+         done = abs(omega - middle%omega) <= limits%same_frequency*middle%omega
       end associate
    end subroutine find_next
 
@@ -160,8 +142,6 @@ contains
       real(wp), intent(in) :: mean
       real(wp), intent(inout) :: omega, promise
       logical, intent(out) :: done
-      !> Of the tolerance: a third difference says little of a corner.
-      real(wp), parameter :: borne_out = 0.2_wp
       real(wp) :: gain, place, most
       integer :: direction
 
@@ -172,11 +152,12 @@ contains
          most = gain
          omega = place
       end do
-      done = most <= small_gain .or. misses_parabola(samples, k, i, mean) <= borne_out*small_gain
+      done = most <= limits%small_gain .or. misses_parabola(samples, k, i, mean) &
+             <= limits%borne_out*limits%small_gain
       if (done) return
       associate (middle => samples%item(k)%at)
          promise = (1.0_wp + most)*swing_of(middle, i, mean)
-         done = abs(omega - middle%omega) <= same_frequency*middle%omega
+         done = abs(omega - middle%omega) <= limits%same_frequency*middle%omega
       end associate
    end subroutine find_corner
 
@@ -195,8 +176,8 @@ contains
       associate (before => samples%item(k - direction)%at, middle => samples%item(k)%at, &
                  behind => samples%item(k + direction)%at)
          way = abs(behind%omega - middle%omega)
-         if (way <= same_frequency*middle%omega .or. &
-             abs(middle%omega - before%omega) <= same_frequency*middle%omega) return
+         if (way <= limits%same_frequency*middle%omega .or. &
+             abs(middle%omega - before%omega) <= limits%same_frequency*middle%omega) return
          rise = (middle%amplitude(i) - before%amplitude(i))/abs(middle%omega - before%omega)
          ! Of the part that lies on the line behind, if one is known, and of all else.
          share = 0.5_wp
@@ -208,7 +189,7 @@ contains
             end associate
             if (rise + fall > 0.0_wp) share = ((behind%amplitude(i) - middle%amplitude(i))/way &
                                                + fall)/(rise + fall)
-            share = min(max(share, margin), 1.0_wp - margin)
+            share = min(max(share, limits%margin), 1.0_wp - limits%margin)
             gain = rise*way*share
          end if
          omega = middle%omega + direction*share*way
@@ -235,7 +216,7 @@ contains
                g(j) = (swing/swing_of(at, i, mean))**2
             end associate
          end do
-         if (abs(s(4) - s(3)) <= same_frequency*samples%item(k)%at%omega**2) cycle
+         if (abs(s(4) - s(3)) <= limits%same_frequency*samples%item(k)%at%omega**2) cycle
          third = abs(divided_difference(s, g))
          do side = 1, 2
             associate (middle => 0.5_wp*(s(side) + s(side + 1)))
@@ -266,7 +247,6 @@ contains
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
       real(wp), intent(in) :: mean
-      real(wp), parameter :: as_long = 2.0_wp
       integer :: direction
 
       is_cut_off = .false.
@@ -274,11 +254,11 @@ contains
          if (k + 2*direction < 1 .or. k + 2*direction > samples%n) cycle
          associate (middle => samples%item(k)%at, side => samples%item(k + direction)%at, &
                     behind => samples%item(k + 2*direction)%at)
-            if (swing_of(side, i, mean) < near*swing_of(middle, i, mean)) cycle
+            if (swing_of(side, i, mean) < limits%near*swing_of(middle, i, mean)) cycle
             is_cut_off = is_cut_off .or. &
-                         swing_of(behind, i, mean) < deep*swing_of(middle, i, mean) .and. &
+                         swing_of(behind, i, mean) < limits%deep*swing_of(middle, i, mean) .and. &
                          abs(behind%omega - side%omega) <= &
-                         as_long*abs(side%omega - middle%omega)
+                         limits%as_long*abs(side%omega - middle%omega)
          end associate
       end do
    end function is_cut_off
@@ -297,11 +277,11 @@ contains
 
       swing = swing_of(middle, i, mean)
       known = swing_of(side, i, mean) >= share*swing .or. &
-              abs(side%omega - middle%omega) <= same_frequency*middle%omega
+              abs(side%omega - middle%omega) <= limits%same_frequency*middle%omega
       if (known .or. swing_of(other, i, mean) < share*swing) return
       slope = (middle%amplitude(i) - other%amplitude(i))/ &
               max(abs(middle%omega - other%omega), tiny(1.0_wp))
-      known = slope*abs(side%omega - middle%omega) <= small_gain*swing
+      known = slope*abs(side%omega - middle%omega) <= limits%small_gain*swing
    end function side_is_known
 
    !> A frequency towards a neighbour that is far below, where the peak would have fallen a little.
@@ -311,18 +291,16 @@ contains
       real(wp), intent(in) :: mean, curvature
       !> What a neighbour should have of the height, at least.
       real(wp), intent(in) :: share
-      !> Of the rise of 1/A**2 up to there.
-      real(wp), parameter :: inside = 0.65_wp
       real(wp) :: distance, half, rise
 
-      rise = inside*(1.0_wp/share**2 - 1.0_wp)
+      rise = limits%inside*(1.0_wp/share**2 - 1.0_wp)
       half = 0.5_wp*abs(side%omega - middle%omega)
       distance = half
       if (curvature > 0.0_wp) then
          distance = sqrt(rise/curvature)/swing_of(middle, i, mean) &
                     /(2.0_wp*middle%omega)
       end if
-      distance = min(max(distance, 2.0_wp*margin*half), half)
+      distance = min(max(distance, 2.0_wp*limits%margin*half), half)
       omega = middle%omega + sign(distance, side%omega - middle%omega)
    end function beside
 
@@ -334,8 +312,6 @@ contains
       !> Of the side that is not known: 1 above, -1 below.
       integer, intent(in) :: direction
       real(wp), intent(in) :: vertex
-      !> Longest step over what is known, so as to stay on the branch.
-      real(wp), parameter :: onwards = 1.5_wp
       real(wp) :: step(2), slope(2), way
 
       omega = vertex
@@ -349,7 +325,7 @@ contains
                   last%amplitude(i) - before%amplitude(i)]/step
          if (.not. slope(1) > 0.0_wp) return
          ! Where the slope, which falls from one step to the next, comes to nothing.
-         way = min(0.5_wp*abs(beyond%omega - middle%omega), onwards*step(1))
+         way = min(0.5_wp*abs(beyond%omega - middle%omega), limits%onwards*step(1))
          if (slope(2) > slope(1)) then
             way = min(way, 0.5_wp*sum(step)*slope(1)/(slope(2) - slope(1)) - 0.5_wp*step(1))
          end if
@@ -361,7 +337,8 @@ contains
    pure real(wp) function within(omega, left, middle, right) result(inside)
       real(wp), intent(in) :: omega, left, middle, right
 
-      inside = min(max(omega, left + margin*(middle - left)), right - margin*(right - middle))
+      inside = min(max(omega, left + limits%margin*(middle - left)), &
+                   right - limits%margin*(right - middle))
    end function within
 
    !> A place beyond what is known of a peak, where the response falls far on a long way that no
@@ -374,7 +351,6 @@ contains
       !> The sample before it.
       integer, intent(out) :: from
       logical, intent(out) :: found
-      real(wp), parameter :: onwards = 2.0_wp
       real(wp) :: peak, mean, known
       integer :: direction, j
 
@@ -388,15 +364,16 @@ contains
          do
             j = j + direction
             if (j < 1 .or. j > samples%n) exit
-            if (swing_of(samples%item(j)%at, i, mean) < near*peak) exit
+            if (swing_of(samples%item(j)%at, i, mean) < limits%near*peak) exit
          end do
          from = j - direction
          if (j < 1 .or. j > samples%n .or. from == k) cycle
-         if (swing_of(samples%item(j)%at, i, mean) > deep*peak) cycle
+         if (swing_of(samples%item(j)%at, i, mean) > limits%deep*peak) cycle
          known = abs(samples%item(from)%at%omega - samples%item(k)%at%omega)
-         found = abs(samples%item(j)%at%omega - samples%item(from)%at%omega) > far_beyond*known
+         found = abs(samples%item(j)%at%omega - samples%item(from)%at%omega) &
+                 > limits%far_beyond*known
          if (.not. found) cycle
-         omega = samples%item(from)%at%omega + direction*onwards*known
+         omega = samples%item(from)%at%omega + direction*limits%onwards_past*known
          return
       end do
    end subroutine find_gap
@@ -411,8 +388,6 @@ contains
       !> [rad/s]
       real(wp), intent(out) :: omega
       logical, intent(out) :: found
-      !> Over what is known of the peak: how near the neighbour is, and how far to go past it.
-      real(wp), parameter :: next_to = 0.02_wp, past = 0.1_wp
       real(wp) :: peak, mean, known
       integer :: direction, j
 
@@ -425,18 +400,18 @@ contains
          side = k + direction
          if (side <= 1 .or. side >= samples%n) cycle
          if (samples%item(side)%at%is_edge) cycle
-         if (swing_of(samples%item(side)%at, i, mean) > near*peak) cycle
+         if (swing_of(samples%item(side)%at, i, mean) > limits%near*peak) cycle
          j = k - direction
          do while (j > 1 .and. j < samples%n)
-            if (swing_of(samples%item(j)%at, i, mean) < near*peak) exit
+            if (swing_of(samples%item(j)%at, i, mean) < limits%near*peak) exit
             j = j - direction
          end do
          if (j < 1 .or. j > samples%n) cycle
          known = abs(samples%item(j)%at%omega - samples%item(k)%at%omega)
          associate (at => samples%item(side)%at, next => samples%item(side + direction)%at)
-            found = abs(at%omega - samples%item(k)%at%omega) < next_to*known
+            found = abs(at%omega - samples%item(k)%at%omega) < limits%next_to*known
             if (.not. found) cycle
-            omega = at%omega + direction*min(past*known, 0.5_wp*abs(next%omega - at%omega))
+            omega = at%omega + direction*min(limits%past*known, 0.5_wp*abs(next%omega - at%omega))
          end associate
          return
       end do
@@ -450,7 +425,7 @@ contains
       associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
                  right => samples%item(k + 1)%at, mean => samples%item(k)%at%mean(i))
          lies_on_jump = min(swing_of(left, i, mean), swing_of(right, i, mean)) &
-                        < near*swing_of(middle, i, mean)
+                        < limits%near*swing_of(middle, i, mean)
       end associate
    end function lies_on_jump
 
@@ -482,7 +457,6 @@ contains
       real(wp), intent(out) :: omega
       logical, intent(out) :: found, known
       real(wp) :: peak, inner(2), outer(2), share
-      real(wp), parameter :: far = 2.0_wp, at_edge = 0.9_wp
       integer :: j
 
       omega = -1.0_wp
@@ -502,7 +476,7 @@ contains
          inner = outer
       end do
       found = .true.
-      known = outer(2) <= far .or. inner(2) >= at_edge
+      known = outer(2) <= limits%far .or. inner(2) >= limits%at_edge
       share = (1.0_wp - inner(2))/(outer(2) - inner(2))
       omega = sqrt(inner(1) + share*(outer(1) - inner(1)))
    end subroutine find_edge
@@ -602,9 +576,9 @@ contains
          if (.not. done .or. has_gap .or. any(failed > samples%item(k - 1)%at%omega .and. &
                                  failed < samples%item(k + 1)%at%omega)) then
             peak%found_by = found_unresolved
-         else if (at%amplitude(i) >= near*highest_of(samples, i)) then
+         else if (at%amplitude(i) >= limits%near*highest_of(samples, i)) then
             ! Lower ones may hide a corner.
-            peak%tolerance = small_gain
+            peak%tolerance = limits%small_gain
          end if
       end associate
    end function describe

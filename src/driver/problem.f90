@@ -377,8 +377,8 @@ contains
       locates_events = harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &
                        (analyses(case%analysis)%is_response .or. &
                         analyses(case%analysis)%wears) .and. &
-                       .not. harmonics%adaptive .and. .not. case%output%histories .and. &
-                       .not. case%sweep%stability .and. .not. is_planar(joint)
+                       .not. case%output%histories .and. .not. case%sweep%stability .and. &
+                       .not. is_planar(joint)
    end function locates_events
 
    !> Whether a pair moves in two tangential directions.

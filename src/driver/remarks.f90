@@ -198,7 +198,7 @@ contains
          if (any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1))) then
             words = "slip in two directions has no law of high order"
          else if (h%method /= method_hbm .or. h%sampling == sampling_uniform .or. h%n_time > 0 &
-                  .or. h%adaptive .or. case%output%histories) then
+                  .or. case%output%histories) then
             words = "instants are asked for, and 'rigid' follows events"
          else
             words = "'rigid' needs positive damping of every dof"

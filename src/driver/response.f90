@@ -4,7 +4,6 @@ module fw_response
    use fw_kinds, only: wp
    use fw_case, only: analyses, case_type
    use fw_continuation, only: arclength_type, branch_point
-   use fw_difference_system, only: difference_system, new_difference_system
    use fw_error, only: error_type
    use fw_flow, only: flow_system, new_flow
    use fw_formulation, only: formulation_type
@@ -30,8 +29,7 @@ module fw_response
    use fw_undetermined, only: idle_motion, undetermined_note, undetermined_search
    use fw_slip_gap, only: lacks_friction
    use fw_solution_history, only: position, solution_history
-   use fw_solver_options, only: pseudo_time_options, jacobian_difference, solver_kinsol, &
-      solver_powell
+   use fw_solver_options, only: pseudo_time_options, solver_kinsol, solver_powell
    use fw_strategy, only: point_request
    use fw_vibration, only: vibration, walk_options, walk_type, way_guesses_by_lu, way_last_guess, &
       way_own, way_rise, way_steps, way_type
@@ -281,10 +279,8 @@ contains
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
       type(formulation_type), target :: formulation
-      type(difference_system), target :: by_differences
-      class(parameter_system), pointer :: given, solved
+      class(parameter_system), pointer :: solved
       real(wp), allocatable :: unknowns(:)
-      logical :: reduced
       integer :: iterations, trial
 
       associate (unused => allocated(error))
@@ -292,14 +288,7 @@ contains
       iterations = 0
       self%ripples = .false.
       call formulation%begin(self%balance)
-      given => formulation%as_solved()
-      solved => given
-      reduced = given%reduced
-      if (self%newton%options%jacobian == jacobian_difference) then
-         ! The solver sees a system like any other, whose products are differences.
-         by_differences = new_difference_system(given)
-         solved => by_differences
-      end if
+      solved => formulation%as_solved()
       allocate (unknowns(self%balance%n))
       call formulation%from_coefficients(x, unknowns)
       do trial = 1, 2
@@ -316,8 +305,7 @@ contains
          ! Newton's method evaluates what it accepts last; other solvers, and formulations with
          ! unknowns of their own, may have been elsewhere.
          self%stands = report%converged .and. self%kind /= solver_powell .and. &
-                       self%kind /= solver_kinsol .and. &
-                       self%newton%options%jacobian /= jacobian_difference
+                       self%kind /= solver_kinsol
          if (self%stands) self%stands = all(abs(unknowns - x) <= 0.0_wp)
          self%left_tolerance = .false.
          if (report%converged) call refuse_unreal(self, self%balance, x, report)
@@ -326,7 +314,6 @@ contains
          iterations = report%iterations
          call formulation%from_coefficients(x, unknowns)
       end do
-      if (self%newton%options%jacobian == jacobian_difference) given%reduced = reduced
       self%iterations = self%iterations + report%iterations
    end subroutine solve
 

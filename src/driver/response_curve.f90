@@ -24,6 +24,7 @@ module fw_response_curve
    use fw_response_quantity, only: of_first_harmonic, response_quantity
    use fw_response_rows, only: new_rows, response_row
    use fw_sensitivity, only: sensitivity_finder
+   use fw_size_options, only: sizes
    use fw_solver_options, only: linear_krylov, linear_lu, solver_options
    use fw_structure_operator, only: by_frequency
    implicit none (type, external)
@@ -31,8 +32,6 @@ module fw_response_curve
 
    public :: response_curve
 
-   !> Unknowns up to which one LU serves all solutions; GMRES above.
-   integer, parameter :: lu_up_to = 600
    !> Relative residual asked of GMRES.
    real(wp), parameter :: krylov_tolerance = 1.0e-12_wp
    !> Step of the differences, as a change of q over its size: its square is their error.
@@ -106,7 +105,7 @@ contains
       self%shifted%reduced = .false.
       self%linear%kind = self%newton%options%linear
       if (self%linear%kind /= linear_lu .and. self%linear%kind /= linear_krylov) then
-         self%linear%kind = merge(linear_lu, linear_krylov, self%state%n <= lu_up_to)
+         self%linear%kind = merge(linear_lu, linear_krylov, self%state%n <= sizes%lu_of_slopes)
       end if
       self%linear%keeps = .false.
       self%linear%lu_follows = .true.
@@ -345,7 +344,6 @@ contains
          call s%observed_slope(state%structure_state, q, slope)
       end associate
    end subroutine observed_by_frequency
-
 
    !> Along the resonance as each of some parameters changes: derivatives of its frequency and of
    !> Q, at the point that was looked at last.

@@ -278,11 +278,11 @@ contains
       end if
       if (.not. analyses(self%case%analysis)%is_response .or. &
           self%case%sweep%continuation /= continuation_natural .or. &
-          self%case%harmonics%adaptive .or. self%case%harmonics%accuracy > 0.0_wp) then
+          self%case%harmonics%accuracy > 0.0_wp) then
          call fatal_error(error, 'steps go through frequencies of harmonic balance: '// &
                           "case%analysis must be 'frf' or 'point', sweep%continuation "// &
-                          "'natural', harmonics%adaptive .false. and harmonics%accuracy 0; run "// &
-                          'the case as a whole instead', status_usage)
+                          "'natural' and harmonics%accuracy 0; run the case as a whole instead", &
+                          status_usage)
          return
       end if
       call forget_system(self)

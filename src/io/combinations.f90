@@ -97,13 +97,14 @@ contains
       if (.not. case%sweep%is_piece()) return
       n_points = case%sweep%n_points
       if (case%sweep%first_point > n_points) then
-         call fatal_error(error, 'sweep%first_point = '//to_text(case%sweep%first_point)// &
-                          ': must be one of the '//to_text(n_points)//' points', status_input)
+         call fatal_error(error, 'first point of a piece = '// &
+                          to_text(case%sweep%first_point)//': must be one of the '// &
+                          to_text(n_points)//' points of the sweep', status_input)
       else if (case%sweep%last_point > n_points .or. &
                (case%sweep%last_point > 0 .and. &
                 case%sweep%last_point < case%sweep%first_point)) then
-         call fatal_error(error, 'sweep%last_point = '//to_text(case%sweep%last_point)// &
-                          ': must be from first_point = '//to_text(case%sweep%first_point)// &
+         call fatal_error(error, 'last point of a piece = '//to_text(case%sweep%last_point)// &
+                          ': must be from its first = '//to_text(case%sweep%first_point)// &
                           ' to '//to_text(n_points)//', or 0', status_input)
       end if
    end subroutine check_piece

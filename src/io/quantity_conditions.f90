@@ -96,14 +96,14 @@ contains
    pure logical function has_levels(case)
       type(case_type), intent(in) :: case
 
-      has_levels = case%harmonics%adaptive .or. is_accurate(case)
+      has_levels = is_accurate(case)
    end function has_levels
 
    !> Whether the harmonics follow from a wanted accuracy.
    pure logical function is_accurate(case)
       type(case_type), intent(in) :: case
 
-      is_accurate = case%harmonics%accuracy > 0.0_wp .and. .not. case%harmonics%adaptive
+      is_accurate = case%harmonics%accuracy > 0.0_wp
    end function is_accurate
 
    pure logical function asks_stability(case)

@@ -182,7 +182,7 @@ contains
       associate (h => case%harmonics, c => case%contact)
          goes = analyses(case%analysis)%is_balanced .and. &
                 h%method == method_hbm .and. h%sampling /= sampling_uniform .and. &
-                h%n_time == 0 .and. .not. h%adaptive .and. .not. case%output%histories .and. &
+                h%n_time == 0 .and. .not. case%output%histories .and. &
                 .not. any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)) .and. &
                 .not. feeds_energy(case)
       end associate
@@ -241,7 +241,7 @@ contains
          goes_with_accuracy = analyses(case%analysis)%is_response .and. &
                               case%sweep%continuation == continuation_natural .and. &
                               harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &
-                              .not. harmonics%adaptive .and. .not. case%output%histories .and. &
+                              .not. case%output%histories .and. &
                               case%contact%memory /= memory_carried .and. &
                               100.0_wp*case%solver%tolerance <= usual_accuracy
       end associate

@@ -76,9 +76,6 @@ contains
       if (options%n_time > 0) then
          call reader%refuse('harmonics', 'n_time', '= '//to_text(options%n_time)//': with '// &
                             'accuracy the program chooses it; leave it out')
-      else if (options%adaptive) then
-         call reader%refuse('harmonics', 'adaptive', '= .true.: accuracy chooses harmonics by '// &
-                            'the error of the response instead; leave adaptive out')
       else if (options%method /= method_hbm) then
          call reader%refuse('harmonics', 'accuracy', "goes with method = 'hbm': collocation "// &
                             'leaves an error of first order in 1/H that no estimate bounds; '// &
@@ -109,7 +106,6 @@ contains
       if (analyses(analysis)%is_free) call refuse_sweep(reader)
       call check_ends(reader, analysis, options)
       call take_values(reader, analysis, options, over)
-      if (allocated(options%frequencies)) call take_list(reader, analysis, options)
       ! Everything inside is in rad/s; the effective input keeps the unit of the user.
       if (options%unit == unit_hertz) then
          if (allocated(options%frequencies)) options%frequencies = 2.0_wp*pi*options%frequencies
@@ -128,23 +124,18 @@ contains
       if (.not. over%is_wanted()) then
          call refuse_of_parameter(reader)
          if (.not. allocated(over%values)) return
-         if (allocated(options%frequencies)) then
-            call reader%refuse('sweep', 'values', 'is given beside frequencies: keep one of '// &
-                               'the two')
-         else if (any(over%values <= 0.0_wp)) then
+         if (any(over%values <= 0.0_wp)) then
             call reader%refuse('sweep', 'values', 'are frequencies: must be above 0')
          else
             call move_alloc(over%values, options%frequencies)
-            call refuse_list(reader, analysis, options, 'values')
+            call take_list(reader, analysis, options)
          end if
          return
       end if
-      if (allocated(options%frequencies)) call reader%refuse('sweep', 'frequencies', &
-         'does not go with another parameter: give values, and frequency')
       if (.not. analyses(analysis)%is_sweep) call reader%refuse('sweep', 'parameter', "= '"// &
          trim(parameter_words(over%number))//"' goes with analysis = 'frf': leave it out")
       if (allocated(over%values)) then
-         call refuse_list(reader, analysis, options, 'values')
+         call refuse_list(reader, analysis, options)
          options%n_points = size(over%values)
          if (options%n_points > 0) over%start = over%values(1)
          if (options%n_points > 0) over%end = over%values(options%n_points)
@@ -173,11 +164,9 @@ contains
    !> The frequencies of a mode are its own.
    subroutine refuse_sweep(reader)
       type(reader_type), intent(inout) :: reader
-      character(*), parameter :: keys(*) = [character(12) :: 'parameter', 'frequencies', &
-                                            'values', 'start', 'end', 'unit', 'continuation', &
-                                            'n_points', 'max_points', &
-                                            'stability', 'refine', 'first_point', &
-                                            'last_point', 'lead_points']
+      character(*), parameter :: keys(*) = [character(12) :: 'parameter', 'values', 'start', &
+                                            'end', 'unit', 'continuation', 'n_points', &
+                                            'max_points', 'stability', 'refine']
       integer :: i
 
       do i = 1, size(keys)
@@ -291,8 +280,7 @@ contains
       integer, intent(in) :: analysis
       type(sweep_options), intent(inout) :: options
 
-      if (reader%given('sweep', 'frequencies')) call refuse_list(reader, analysis, options, &
-                                                                'frequencies')
+      call refuse_list(reader, analysis, options)
       ! Refused before: it was given, but not as it must be.
       if (size(options%frequencies) == 0) return
       options%n_points = size(options%frequencies)
@@ -301,28 +289,26 @@ contains
    end subroutine take_list
 
    !> A list stands for start, end and n_points.
-   subroutine refuse_list(reader, analysis, options, key)
+   subroutine refuse_list(reader, analysis, options)
       type(reader_type), intent(inout) :: reader
       integer, intent(in) :: analysis
       type(sweep_options), intent(in) :: options
-      !> That it is given by.
-      character(*), intent(in) :: key
       character(*), parameter :: others(*) = [character(8) :: 'start', 'end', 'n_points']
       integer :: i
 
       do i = 1, size(others)
          if (reader%given('sweep', trim(others(i)))) then
-            call reader%refuse('sweep', trim(others(i)), 'is given beside '//key//', which '// &
-                               'says it: keep one of the two')
+            call reader%refuse('sweep', trim(others(i)), 'is given beside values, which say '// &
+                               'it: keep one of the two')
          end if
          ! None of the three shall stand in the effective input beside the list.
          call reader%amend('sweep', trim(others(i)), '')
       end do
       if (.not. (analyses(analysis)%is_sweep .or. analyses(analysis)%is_integrated)) then
-         call reader%refuse('sweep', key, "goes with analysis = 'frf' or 'time': "// &
+         call reader%refuse('sweep', 'values', "go with analysis = 'frf' or 'time': "// &
                             'give start, the one frequency, instead')
       else if (options%continuation == continuation_arclength) then
-         call reader%refuse('sweep', key, "does not go with continuation = "// &
+         call reader%refuse('sweep', 'values', "do not go with continuation = "// &
                             "'arclength', whose points are its own: give start and end")
       end if
    end subroutine refuse_list

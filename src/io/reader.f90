@@ -6,6 +6,7 @@
 !> recorded.
 module fw_reader
    use fw_error, only: error_type
+   use fw_former_keys, only: hint_of_former_key
    use fw_input, only: input_type
    use fw_key, only: key_type
    use fw_kinds, only: wp
@@ -455,7 +456,8 @@ contains
       character(:), allocatable :: hint
       integer :: i
 
-      hint = ''
+      hint = hint_of_former_key(group, name)
+      if (len(hint) > 0) return
       do i = 1, size(self%records%groups)
          if (.not. self%records%has(self%records%groups(i)%text, name)) cycle
          if (len(hint) > 0) hint = hint//', &'//self%records%groups(i)%text

@@ -165,8 +165,7 @@ contains
    !> Frequencies typed in hertz are those of a sweep in hertz, where it does not say.
    subroutine take_hertz(reader)
       type(reader_type), intent(inout) :: reader
-      character(*), parameter :: keys(*) = &
-         [character(11) :: 'start', 'end', 'frequencies', 'frequency']
+      character(*), parameter :: keys(*) = [character(9) :: 'start', 'end', 'values', 'frequency']
       type(entry_type) :: new
       type(error_type), allocatable :: ignored
       integer :: i, k

@@ -15,6 +15,7 @@ module fw_cyclic_structure
    use fw_sector_reduction, only: sector_reduction
    use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, &
       observed_sector_slope, recover_sector, slopes_of, work_of_sector
+   use fw_size_options, only: sizes
    use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_operator, &
       structure_state
    use fw_text, only: to_text
@@ -26,8 +27,6 @@ module fw_cyclic_structure
 
    !> A mode may stiffen up to this many times the frequency of its stuck motion.
    real(wp), parameter :: reach_of_mode = 2.0_wp
-   !> Coordinates from which copies in single precision pay (bench/speed/sectors.py).
-   integer, parameter :: least_near = 48
    !> More internal modes than any nodal diameter has.
    integer, parameter :: most_modes = 1000000
 
@@ -365,7 +364,7 @@ contains
    pure logical function has_near_product(self)
       class(cyclic_structure), intent(in) :: self
 
-      has_near_product = self%n_coordinates >= least_near
+      has_near_product = self%n_coordinates >= sizes%single_matrices
    end function has_near_product
 
    subroutine block_of_all(self, state, h, matrix)

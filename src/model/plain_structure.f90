@@ -26,6 +26,7 @@ module fw_plain_structure
    use fw_real_products, only: harmonic_factors, real_products
    use fw_reduction, only: held_basis, new_reduction
    use fw_relative, only: relative_type
+   use fw_size_options, only: sizes
    use fw_split_product, only: split_product
    use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_state
    use fw_text, only: to_text
@@ -69,10 +70,6 @@ module fw_plain_structure
       !> Whether formed matrices have them in single precision.
       logical :: packed = .false.
    end type plain_state
-
-   !> Coordinates from which formed matrices are copied in single precision for steps
-   !> (python -m bench.run scaling, peers).
-   integer, parameter :: least_near = 48
 
    !> Entries of all complex matrices from which real products pay (1 MB, more than the cache of a
    !> core holds), and internal modes for each coordinate up to which they do. Measured on sweeps
@@ -418,7 +415,7 @@ contains
    pure logical function has_near_product(self)
       class(plain_structure), intent(in) :: self
 
-      has_near_product = self%forms_blocks .and. self%n_coordinates >= least_near
+      has_near_product = self%forms_blocks .and. self%n_coordinates >= sizes%single_matrices
    end function has_near_product
 
    subroutine static_block(self, state, matrix)

@@ -8,6 +8,7 @@ module fw_reduction
    use fw_linalg, only: diagonalize, has_pivots, solve_symmetric_eigen
    use fw_model, only: model_type
    use fw_relative, only: relative_type
+   use fw_size_options, only: sizes
    use fw_sparse_rows, only: new_sparse_rows, sparse_rows
    implicit none (type, external)
    private
@@ -68,8 +69,6 @@ module fw_reduction
    real(wp), parameter :: mode_round_off = 1.0e-13_wp
    !> Couplings of a mode are none beside its own stiffness, mass or critical damping.
    real(wp), parameter :: own_round_off = 1.0e-12_wp
-   !> Dofs up to which the basis is kept: it takes no room worth mentioning.
-   integer, parameter :: most_kept = 400
    !> Relative stiffness below which an internal mode is free.
    real(wp), parameter :: free_stiffness = 1.0e-11_wp
 
@@ -120,7 +119,9 @@ contains
       end if
       self%kept = pack([(j, j=1, size(keep))], keep)
       call clear_round_off(model, t_q, t_i, self)
-      if (model%n_dof <= most_kept) self%basis = reshape([t_q, t_i], [model%n_dof, model%n_dof])
+      if (model%n_dof <= sizes%kept_basis) then
+         self%basis = reshape([t_q, t_i], [model%n_dof, model%n_dof])
+      end if
       if (allocated(model%changes)) call transform_changes(model, t_q, t_i, self)
    end subroutine new_reduction
 

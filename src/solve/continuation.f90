@@ -7,10 +7,11 @@ module fw_continuation
    use fw_branch_retrace, only: branch_trail
    use fw_branch_turn, only: all_around, far_ahead, leap, only_ahead
    use fw_branch_way, only: branch_way
+   use fw_curve_options, only: limits
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_parameter_system, only: parameter_system
-   use fw_predictor_corrector, only: bifurcation, corner, predictor_corrector, turning
+   use fw_predictor_corrector, only: predictor_corrector
    use fw_solver_options, only: solver_options
    use fw_text, only: to_text
    implicit none (type, external)
@@ -154,7 +155,7 @@ contains
       done = .true.
       call self%trail%keep(self%corrector%metric, self%here)
       if (self%here%t_p*ahead%t_p >= 0.0_wp .and. .not. self%trail%has_turned) return
-      if (self%corrector%metric%chord(self%here, ahead) > corner) return
+      if (self%corrector%metric%chord(self%here, ahead) > limits%corner) return
       call self%trail%is_retraced(self%corrector, system, ahead, retraced, error)
       if (allocated(error)) return
       if (retraced) then
@@ -300,7 +301,7 @@ contains
 
       if (associated(self%corrector%view)) then
          ! With many pairs, places where pieces meet lie close together: across them.
-         call self%shorten_until_taken(system, turning, 0.5_wp, ahead, done, error)
+         call self%shorten_until_taken(system, limits%turning, 0.5_wp, ahead, done, error)
          if (allocated(error) .or. done) return
          call leap(self%corrector, system, self%here, far_ahead, ahead, error)
          if (.not. allocated(error)) call leads_on(self, system, ahead, done, error)
@@ -309,9 +310,9 @@ contains
       call self%shorten_until_taken(system, shortest, 0.5_wp, ahead, done, error)
       if (allocated(error) .or. done) return
       ! A predictor from before a corner leads away from it: along the tangent, then.
-      self%ds = corner
+      self%ds = limits%corner
       self%history%known = .false.
-      call self%shorten_until_taken(system, bifurcation, 0.7_wp, ahead, done, error)
+      call self%shorten_until_taken(system, limits%bifurcation, 0.7_wp, ahead, done, error)
       if (allocated(error) .or. done) return
       self%corrector%careful = .false.
       call leap(self%corrector, system, self%here, all_around, ahead, error)

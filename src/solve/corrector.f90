@@ -19,6 +19,7 @@ module fw_corrector
    use fw_newton, only: newton_solver, solver_report
    use fw_parameter_system, only: parameter_system
    use fw_plane_system, only: plane_system
+   use fw_size_options, only: sizes
    use fw_solver_options, only: linear_auto, linear_lu, solver_options
    implicit none (type, external)
    private
@@ -67,12 +68,6 @@ module fw_corrector
    real(wp), parameter :: steep = 1.0e-4_wp
    !> The part of p in a tangent below which p does not move.
    real(wp), parameter :: constant = 1.0e-6_wp
-   !> Unknowns up to which the orientation is looked at: it takes the LU factors of the whole
-   !> derivative, which beyond cost more than the points of the branch.
-   integer, parameter :: orientation_up_to = 1000
-   !> Unknowns up to which LU is taken along a branch: it costs no more than the dozens of Krylov
-   !> iterations that tangents and resonances take, and its factors tell the orientation.
-   integer, parameter :: branch_lu_up_to = 400
    !> Iterative linear solutions: the tangent needs more digits than a Newton step.
    real(wp), parameter :: branch_forcing = 1.0e-6_wp
    real(wp), parameter :: step_forcing = 1.0e-3_wp
@@ -85,13 +80,13 @@ contains
       class(parameter_system), intent(in) :: system
 
       self%linear%kind = self%options%linear
-      if (self%linear%kind == linear_auto .and. system%n <= branch_lu_up_to) then
+      if (self%linear%kind == linear_auto .and. system%n <= sizes%lu_of_branch) then
          self%linear%kind = linear_lu
       end if
       ! Derivatives near folds and runaway branches are too close to singular for old factors.
       self%linear%keeps = .false.
       self%linear%lu_follows = .true.
-      self%oriented = system%n <= orientation_up_to
+      self%oriented = system%n <= sizes%orientation
    end subroutine reset
 
    !> From a guess in `next` to the branch, across the tangent of `here`; report%converged says

@@ -5,19 +5,13 @@ module fw_linear_step
    use fw_kinds, only: wp
    use fw_krylov, only: gmres_type
    use fw_linalg, only: lu_type
+   use fw_size_options, only: sizes
    use fw_solver_options, only: linear_auto, linear_lu, linear_krylov
    use fw_system, only: nonlinear_system
    implicit none (type, external)
    private
 
-   public :: linear_step_type, lu_up_to
-
-   !> Unknowns up to which LU is taken. GMRES has become the faster from about half of them on
-   !> (docs/benchmarks.md); LU needs no preconditioner that serves.
-   integer, parameter :: lu_up_to = 60
-
-   !> Unknowns up to which LU is tried where GMRES has failed: above, it costs too much.
-   integer, parameter :: lu_possible_up_to = 600
+   public :: linear_step_type
 
    !> A kept preconditioner may cost this much more than a fresh one, in iterations: a build takes
    !> as long as about five of them.
@@ -115,7 +109,8 @@ contains
          self%n_problems = self%n_problems + 1
          self%share_skipped = self%share_skipped + 1.0_wp - &
                               real(n + system%n_eliminated, wp)/real(system%n, wp)
-         if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_up_to)) then
+         if (self%kind == linear_lu .or. &
+             (self%kind == linear_auto .and. n <= sizes%lu_of_step)) then
             call factor(self, system, n, done)
          else
             ! The system knows whether its state is still that of the preconditioner.
@@ -209,7 +204,7 @@ contains
       self%solution = 0.0_wp
       if (n > 0 .and. .not. self%factored) then
          call iterate_from_start(self, system, tolerance, done, scale, is_alike)
-         if (.not. done .and. self%kind /= linear_krylov .and. n <= lu_possible_up_to) then
+         if (.not. done .and. self%kind /= linear_krylov .and. n <= sizes%lu_possible) then
             if (self%lu_follows .and. .not. system%is_interrupted()) then
                call factor(self, system, n, done)
                if (.not. done) return

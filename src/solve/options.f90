@@ -10,7 +10,6 @@ module fw_solver_options
    public :: solver_options, pseudo_time_options, sweep_options
    public :: solver_newton, solver_powell, solver_kinsol, solver_pseudo_time
    public :: linear_auto, linear_lu, linear_krylov
-   public :: jacobian_analytic, jacobian_difference
    public :: flow_rotated, flow_identity, flow_preconditioned
    public :: scheme_words, scheme_implicit_euler, scheme_bdf, scheme_rosenbrock, &
              scheme_runge_kutta
@@ -24,9 +23,6 @@ module fw_solver_options
 
    character(*), parameter :: linear_words(*) = [character(6) :: 'auto', 'lu', 'krylov']
    integer, parameter :: linear_auto = 1, linear_lu = 2, linear_krylov = 3
-
-   character(*), parameter :: jacobian_words(*) = [character(10) :: 'analytic', 'difference']
-   integer, parameter :: jacobian_analytic = 1, jacobian_difference = 2
 
    character(*), parameter :: flow_words(*) = &
       [character(14) :: 'rotated', 'identity', 'preconditioned']
@@ -50,7 +46,6 @@ module fw_solver_options
       !> One of the constants above, as are all whole numbers with words.
       integer :: kind = solver_newton
       integer :: linear = linear_auto
-      integer :: jacobian = jacobian_analytic
       !> On norm(R)/norm(F).
       real(wp) :: tolerance = 1.0e-8_wp
       !> Steps of Newton's method from each guess; Jacobians of Powell's; nonlinear iterations of
@@ -88,7 +83,7 @@ module fw_solver_options
       !> Points of a natural sweep, both ends included; of a branch the number that sets its first
       !> step.
       integer :: n_points = 1
-      !> Frequencies one by one, which start, end and n_points then follow from.
+      !> Frequencies one by one (key `values`), which start, end and n_points then follow from.
       real(wp), allocatable :: frequencies(:)
       integer :: unit = unit_rad_per_second
       integer :: continuation = continuation_natural
@@ -98,10 +93,10 @@ module fw_solver_options
       logical :: stability = .false.
       !> Points that are solved to find maxima become rows of the result.
       logical :: refine = .false.
-      !> A piece of the sweep: its rows (0: up to the last), and how many points on the way from the
-      !> start lead to the first of them.
+      !> A piece of the sweep, which sessions ask for (no keys): its rows (0: up to the last), and
+      !> how many points on the way from the start lead to the first of them.
       integer :: first_point = 1, last_point = 0, lead_points = 0
-      !> The point that the run goes on from, solved by the one before it (0: none; not a key).
+      !> The point that the run goes on from, solved by the one before it (0: none).
       integer :: solved_point = 0
    contains
       procedure :: bind_keys => bind_sweep_keys
@@ -122,9 +117,6 @@ contains
                           self%kind, solver_words)
       call keys%bind_word(key('linear', 'how linear problems are solved; auto: by their size', &
                               only="kind = 'newton', 'pseudo_time'"), self%linear, linear_words)
-      call keys%bind_word(key('jacobian', 'derivative of the residual; difference is a check', &
-                              only="natural sweeps and points, not kind = 'pseudo_time'"), &
-                          self%jacobian, jacobian_words)
       call keys%bind(key('tolerance', 'on the norm of the residual over that of the vibratory '// &
                          'load', above(0.0_wp) .and. below(1.0_wp)), self%tolerance)
       call keys%bind(key('max_iterations', 'steps from each guess', at_least(1)), &
@@ -162,20 +154,16 @@ contains
       logical, intent(in) :: is_sweep
       !> Whether it has a frequency at all (default: yes).
       logical, intent(in), optional :: needs_start
-      !> Whether a list is given under another key, and whether the ends are those of another
-      !> parameter, which may be any number (default: no).
+      !> Whether a list is given, and whether the ends are those of another parameter, which may be
+      !> any number (default: no).
       logical, intent(in), optional :: is_listed, is_other
       type(range_type) :: first, last
       logical :: is_range, needs
 
       call keys%open('sweep', 'frequencies')
-      call keys%bind(key('frequencies', 'a list of frequencies in any order, in place of '// &
-                         'start, end and n_points', above(0.0_wp), unit='unit', shape=':', &
-                         repeats=.false., absent='none', only="analysis = 'frf', 'time', "// &
-                         "continuation = 'natural'"), self%frequencies)
-      is_range = is_sweep .and. .not. allocated(self%frequencies)
-      needs = .not. allocated(self%frequencies)
-      if (present(needs_start)) needs = needs .and. needs_start
+      is_range = is_sweep
+      needs = .true.
+      if (present(needs_start)) needs = needs_start
       if (present(is_listed)) needs = needs .and. .not. is_listed
       if (present(is_listed)) is_range = is_range .and. .not. is_listed
       first = above(0.0_wp)
@@ -206,15 +194,6 @@ contains
                          only="springs and law = 'penalty'"), self%stability)
       call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
                          only="analysis = 'frf', continuation = 'natural'"), self%refine)
-      call keys%bind(key('first_point', 'the first of its points that is a row: a piece of a '// &
-                         'sweep, of which others solve the rest', at_least(1), &
-                         only="analysis = 'frf', continuation = 'natural'"), self%first_point)
-      call keys%bind(key('last_point', 'the last of its points that is a row; 0: the last', &
-                         at_least(0), only="analysis = 'frf', continuation = 'natural'"), &
-                     self%last_point)
-      call keys%bind(key('lead_points', 'points on the way from the start to first_point that '// &
-                         'are solved and are no rows', at_least(0), &
-                         only="first_point above 1"), self%lead_points)
    end subroutine bind_sweep_keys
 
    !> Whether only some of the points are wanted.

@@ -13,6 +13,7 @@ module fw_predictor_corrector
       step_history, turns_between
    use fw_branch_turn, only: turn_at_corner
    use fw_corrector, only: corrector_type, differ
+   use fw_curve_options, only: limits
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_near_response, only: near_response
@@ -20,7 +21,7 @@ module fw_predictor_corrector
    implicit none (type, external)
    private
 
-   public :: predictor_corrector, corner, turning, bifurcation
+   public :: predictor_corrector
 
    type :: predictor_corrector
       type(corrector_type) :: corrector
@@ -49,49 +50,6 @@ module fw_predictor_corrector
       procedure :: limit_step
    end type predictor_corrector
 
-   !> Corrector iterations from which on steps get shorter.
-   integer, parameter :: slow = 7
-   real(wp), parameter :: slower = 0.6_wp
-   !> Growth and shortening of a step.
-   real(wp), parameter :: largest_growth = 2.5_wp, least_growth = 0.3_wp
-   real(wp), parameter :: halved = 0.5_wp
-   !> Steps aim at this part of the error that is allowed.
-   real(wp), parameter :: aim = 0.4_wp
-   !> What the model of the resonances may say of a step that has been taken, of the error that is
-   !> allowed.
-   real(wp), parameter :: passed = 0.6_wp
-   !> What may be found at one place of a step, of the error that is allowed.
-   real(wp), parameter :: looked_at = 0.7_wp
-   !> What unknowns count beside the response that they make, where that is what is measured: they
-   !> may run away where the vibration stays.
-   real(wp), parameter :: weight_x = 0.02_wp
-   !> Failures of a step from which on it is tried in p alone, where p is this part of it at least.
-   integer, parameter :: most_failed = 1
-   real(wp), parameter :: least_share = 2.0e-2_wp
-   !> Share of a step at its ends where no corner is looked for.
-   real(wp), parameter :: least_place = 0.25_wp
-   !> Places of single corners, and where several are looked for.
-   real(wp), parameter :: around(2) = [0.35_wp, 0.72_wp], amidst = 0.42_wp
-   !> Longest step of y over its size.
-   real(wp), parameter :: longest_y = 0.5_wp
-   !> Step over the distance of a simple pole at which a cubic misses (0.45)^4/16 of it, 0.3 %.
-   real(wp), parameter :: beside_pole = 0.45_wp
-   !> What is left of the size of x from one point to the next where x itself gets smaller.
-   real(wp), parameter :: fading = 0.4_wp
-   !> Angles of a step (rad): between its tangents, between a tangent and its chord, and what
-   !> the next step aims at.
-   real(wp), parameter :: max_turn = 0.9_wp, max_chord = 0.55_wp, aimed_turn = 0.6_wp
-   !> Distance of the corrected point from the predictor, in steps.
-   real(wp), parameter :: max_distance = 0.5_wp
-   !> Length up to which a step may turn at any angle and the corrector go as far: corners, and
-   !> what the instants of sampled contact make of a curve, are not to be told apart there. A cubic
-   !> misses at most a quarter of it.
-   real(wp), parameter :: corner = 1.0e-2_wp
-   !> Length from which on the tangent beyond a corner is tried.
-   real(wp), parameter :: turning = 2.5e-3_wp
-   !> Length below which the other orientation is that of a bifurcation.
-   real(wp), parameter :: bifurcation = 1.0e-5_wp
-
 contains
 
    !> Attempts from the present step on, each shorter than the one before.
@@ -108,14 +66,14 @@ contains
       self%n_failed = 0
       do
          ahead = self%here
-         self%corrector%careful = self%ds < turning .or. .not. self%history%known
+         self%corrector%careful = self%ds < limits%turning .or. .not. self%history%known
          call extrapolate(self%corrector%metric, self%history, self%here, self%ds, ahead)
          call attempt(self, system, ahead, shortening, error)
          done = shortening >= 1.0_wp
          if (allocated(error) .or. done) return
          self%n_rejected = self%n_rejected + 1
          self%n_failed = self%n_failed + 1
-         if (self%ds < turning .and. self%corrector%oriented) then
+         if (self%ds < limits%turning .and. self%corrector%oriented) then
             call turn_at_corner(self%corrector, system, self%here, self%ds, ahead, error)
             done = ahead%report%converged
             if (allocated(error) .or. done) return
@@ -123,7 +81,7 @@ contains
          if (self%ds < least) exit
          ! An attempt that has only failed says nothing of the length that would do; a measured
          ! error does.
-         self%ds = self%ds*merge(factor, shortening, abs(shortening - halved) <= 0.0_wp)
+         self%ds = self%ds*merge(factor, shortening, abs(shortening - limits%halved) <= 0.0_wp)
       end do
    end subroutine shorten_until_taken
 
@@ -139,11 +97,11 @@ contains
       real(wp) :: guess_p
       logical :: done, far
 
-      shortening = halved
+      shortening = limits%halved
       call self%forget_ahead()
       guess = ahead%y
       guess_p = ahead%p
-      call self%corrector%correct(system, self%here, max(self%ds, corner), ahead, error)
+      call self%corrector%correct(system, self%here, max(self%ds, limits%corner), ahead, error)
       if (allocated(error)) return
       if (.not. ahead%report%converged .and. goes_across(self)) then
          call extrapolate(self%corrector%metric, self%history, self%here, self%ds, ahead)
@@ -152,11 +110,12 @@ contains
       end if
       if (.not. ahead%report%converged) return
       associate (metric => self%corrector%metric)
-         far = metric%length(ahead%y - guess, ahead%p - guess_p) > max(max_distance*self%ds, corner)
+         far = metric%length(ahead%y - guess, ahead%p - guess_p) &
+               > max(limits%max_distance*self%ds, limits%corner)
       end associate
       ! Converged, but on something else than what was predicted.
       if (far) return
-      if (self%ds <= corner) then
+      if (self%ds <= limits%corner) then
          call look_at_corner(self, system, ahead, done, error)
          if (done) shortening = 1.0_wp
       else
@@ -175,9 +134,10 @@ contains
    pure logical function goes_across(self)
       class(predictor_corrector), intent(in) :: self
 
-      goes_across = associated(self%corrector%view) .and. self%n_failed >= most_failed .and. &
-                    self%ds >= turning .and. &
-                    abs(self%here%t_p) > least_share*self%corrector%metric%p_scale
+      goes_across = associated(self%corrector%view) .and. &
+                    self%n_failed >= limits%most_failed .and. &
+                    self%ds >= limits%turning .and. &
+                    abs(self%here%t_p) > limits%least_share*self%corrector%metric%p_scale
    end function goes_across
 
    !> Whether the angles between tangents and chord are those of one smooth piece.
@@ -193,7 +153,8 @@ contains
                    metric%inner(here%t_y, here%t_p, ahead%y - here%y, ahead%p - here%p)/chord, &
                    metric%inner(ahead%t_y, ahead%t_p, ahead%y - here%y, ahead%p - here%p)/chord]
       end associate
-      bends_little = cosine(1) >= cos(max_turn) .and. all(cosine(2:) >= cos(max_chord))
+      bends_little = cosine(1) >= cos(limits%max_turn) .and. &
+                     all(cosine(2:) >= cos(limits%max_chord))
    end function bends_little
 
    !> At a step that is next to nothing, the tangent of the smaller angle leads back where the
@@ -207,8 +168,6 @@ contains
       !> Whether the step counts.
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
-      !> Cosine of the angle between tangents below which a branch turns sharply.
-      real(wp), parameter :: sharp = 0.8_wp
 
       done = .false.
       call self%corrector%find_orientation(system, self%here, error)
@@ -218,10 +177,10 @@ contains
       done = .true.
       if (.not. differ(ahead, self%here)) return
       if (self%corrector%metric%inner(self%here%t_y, self%here%t_p, ahead%t_y, ahead%t_p) &
-          <= sharp) then
+          <= limits%sharp) then
          call reverse(ahead)
       else
-         done = self%ds < bifurcation
+         done = self%ds < limits%bifurcation
       end if
    end subroutine look_at_corner
 
@@ -239,9 +198,12 @@ contains
                   place)
       ! The error of a cubic grows like ds^4: its fourth root gives the step.
       if (smooth > allowed_error) then
-         shortening = max(least_growth, min(0.8_wp, (aim*allowed_error/smooth)**0.25_wp))
+         shortening = max(limits%least_growth, &
+                          min(0.8_wp, (limits%aim*allowed_error/smooth)**0.25_wp))
       else if (self%here%t_p*ahead%t_p > 0.0_wp) then
-         if (self%near%misses(ahead%p - self%here%p) > passed*allowed_error) shortening = 0.7_wp
+         if (self%near%misses(ahead%p - self%here%p) > limits%passed*allowed_error) then
+            shortening = 0.7_wp
+         end if
       end if
       if (shortening < 1.0_wp) return
       ! While the system stands there.
@@ -250,14 +212,14 @@ contains
       if (corner_error <= allowed_error) return
       ! The estimate of a corner may be a false alarm: one correction there tells. One that lies
       ! where neither a smooth curve nor a single corner has it stands for several of them.
-      if (place < around(1) .or. place > around(2)) then
-         call look_between(self, system, ahead, amidst, found, error)
-         if (found > looked_at*allowed_error) shortening = amidst
-         if (allocated(error) .or. shortening < 1.0_wp .or. place < least_place) return
+      if (place < limits%around_from .or. place > limits%around_to) then
+         call look_between(self, system, ahead, limits%amidst, found, error)
+         if (found > limits%looked_at*allowed_error) shortening = limits%amidst
+         if (allocated(error) .or. shortening < 1.0_wp .or. place < limits%least_place) return
       end if
-      place = max(least_place, min(1.0_wp - least_place, place))
+      place = max(limits%least_place, min(1.0_wp - limits%least_place, place))
       call look_between(self, system, ahead, place, found, error)
-      if (found > looked_at*allowed_error) shortening = place
+      if (found > limits%looked_at*allowed_error) shortening = place
    end subroutine measure
 
    !> What the cubic of a step misses at a place of it: a correction there at a constant p.
@@ -289,7 +251,8 @@ contains
          metric%y_scale = y_scale_at(self, point)
          if (metric%n_seen == 0) return
          ! From point to point scales fall by `fading` at most: a response near zero keeps one.
-         metric%x_scale = max(norm2(point%x)/weight_x, fading*metric%x_scale, self%x_scale/weight_x)
+         metric%x_scale = max(norm2(point%x)/limits%weight_x, &
+                              limits%fading*metric%x_scale, self%x_scale/limits%weight_x)
       end associate
    end subroutine scale_metric
 
@@ -299,7 +262,7 @@ contains
       type(branch_point), intent(in) :: ahead
 
       associate (metric => self%corrector%metric)
-         scale = max(fading*metric%y_scale, self%x_scale)
+         scale = max(limits%fading*metric%y_scale, self%x_scale)
          if (metric%n_seen == 0) then
             scale = max(norm2(ahead%y), scale)
          else
@@ -325,15 +288,15 @@ contains
       real(wp) :: error, unused(2), growth, turn
 
       associate (metric => self%corrector%metric)
-         growth = largest_growth
+         growth = limits%largest_growth
          call missed(metric, self%history, self%here, ahead, error, unused(1), unused(2))
          ! The least of three: by the error of the cubic, by the turn of the tangent, and by the
          ! work that the corrector had.
-         if (error > 0.0_wp) growth = min(growth, (aim*allowed_error/error)**0.25_wp)
+         if (error > 0.0_wp) growth = min(growth, (limits%aim*allowed_error/error)**0.25_wp)
          turn = acos(max(-1.0_wp, min(1.0_wp, metric%inner(self%here%t_y, self%here%t_p, &
                                                            ahead%t_y, ahead%t_p))))
-         if (turn > 0.0_wp) growth = min(growth, max(least_growth, aimed_turn/turn))
-         if (ahead%report%iterations >= slow) growth = min(growth, slower)
+         if (turn > 0.0_wp) growth = min(growth, max(limits%least_growth, limits%aimed_turn/turn))
+         if (ahead%report%iterations >= limits%slow) growth = min(growth, limits%slower)
          self%history%known = .true.
          self%history%before = self%here
          self%here = ahead
@@ -341,7 +304,7 @@ contains
          self%ds = metric%chord(self%history%before, self%here)
          call self%scale_metric(ahead)
          call metric%normalize(self%here)
-         self%ds = max(growth*self%ds, min(corner, largest_growth*self%ds))
+         self%ds = max(growth*self%ds, min(limits%corner, limits%largest_growth*self%ds))
       end associate
       if (allocated(self%near_ahead)) then
          self%near = self%near_ahead
@@ -368,11 +331,11 @@ contains
          ! In shares of the scales of p and of y.
          if (change*self%ds > self%longest) self%ds = self%longest/change
          change = metric%size(here%t_y)
-         if (change*self%ds > longest_y) self%ds = longest_y/change
+         if (change*self%ds > limits%longest_y) self%ds = limits%longest_y/change
          if (self%near%n == 0 .and. allocated(self%pole)) then
             ! By the distance to the nearest pole, and by its width: a resonance there takes
             ! several steps.
-            reach = beside_pole*minval(hypot(here%p - self%pole, self%pole_width))
+            reach = limits%beside_pole*minval(hypot(here%p - self%pole, self%pole_width))
             if (self%ds*abs(here%t_p) > reach) self%ds = reach/abs(here%t_p)
          end if
          self%ds = self%near%bound(self%ds, here%t_p/metric%p_scale, metric%p_scale)

@@ -3,9 +3,9 @@
 module fw_pseudo_linear
    use fw_kinds, only: wp
    use fw_krylov, only: gmres_type
-   use fw_linear_step, only: lu_up_to
    use fw_linalg, only: lu_type
    use fw_pseudo_system, only: pseudo_system
+   use fw_size_options, only: sizes
    use fw_solver_options, only: linear_auto, linear_lu
    implicit none (type, external)
    private
@@ -57,7 +57,7 @@ contains
       done = n_linear == system%n
       if (.not. done) return
       self%direct = self%kind == linear_lu .or. &
-                    (self%kind == linear_auto .and. n_linear <= lu_up_to)
+                    (self%kind == linear_auto .and. n_linear <= sizes%lu_of_step)
       if (self%direct) then
          call self%lu%reserve(n_linear)
          call system%assemble(self%lu%matrix)

@@ -1,6 +1,7 @@
 """Every kind of wrong input: the exit status, and a message with the place and the remedy."""
 import hashlib
 import os
+import re
 
 import pytest
 
@@ -357,3 +358,21 @@ def test_no_stiffness_is_no_slider(fw_run):
     # A force of zero more may change the order of sums, and so the round-off that the solution
     # to 1e-8 enlarges.
     assert np.allclose(shown["two.h5"], shown["three.h5"], rtol=1e-6, atol=0)
+
+
+@pytest.mark.parametrize("key, remedy", [
+    ("harmonics%adaptive=.true.", "use harmonics%accuracy"),
+    ("harmonics%adaptive_tolerance=1e-3", "use harmonics%accuracy"),
+    ("sweep%frequencies=0.5, 0.6", "use sweep%values"),
+    ("sweep%first_point=3", "use sweep%start, sweep%end and sweep%n_points"),
+    ("sweep%last_point=3", "use sweep%start, sweep%end and sweep%n_points"),
+    ("sweep%lead_points=3", "use sweep%start, sweep%end and sweep%n_points"),
+    ("solver%jacobian='analytic'", "solver%linear")])
+def test_a_former_key_names_the_one_to_use(fw_run, key, remedy):
+    group, name = key.partition("=")[0].split("%")
+    message = fw_run.refused("--set", key, "case.nml")
+    assert f"&{group} has no key {name}; " in message and remedy in message
+    # What the message names is a key.
+    keys = fw_run("--keys").stdout
+    for word in re.findall(r"\w+%(\w+)", message.partition("; ")[2]):
+        assert f"   {word} = " in keys

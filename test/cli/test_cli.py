@@ -1,11 +1,12 @@
 """Options, exit statuses and what goes to which stream."""
 import json
 import os
+import re
 import subprocess
 from pathlib import Path
 
 import pytest
-from project import PROGRAM
+from project import PROGRAM, ROOT
 
 
 def test_version(fw_run):
@@ -50,7 +51,8 @@ def test_the_blas_is_named(fw_run, monkeypatch):
 def test_help_names_every_option_and_group(fw_run, option):
     done = fw_run(option)
     assert done.returncode == 0 and done.stderr == ""
-    for word in ["--set", "-o", "--restart", "--keys", "--rules", "--check", "-q", "-v", "--version", "&contact",
+    for word in ["--set", "-o", "--restart", "--keys", "--rules", "--remarks", "--messages",
+                 "--check", "-q", "-v", "--version", "&contact",
                  "Exit status"]:
         assert word in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 88
@@ -75,6 +77,37 @@ def test_rules_name_two_features_and_a_remedy(fw_run):
         asks, rest = line.split(" does not go with ")
         forbids, remedy = rest.split(": ", 1)
         assert asks and forbids and remedy and asks != forbids
+
+
+def test_every_remark_of_the_sources_is_a_row_of_the_table(fw_run):
+    """And every row is made somewhere: by the library, or where pieces of a sweep are joined."""
+    rows = [line.split(" | ") for line in fw_run("--remarks").stdout.splitlines()[2:]]
+    names = [name.removeprefix("| ") for name, _ in rows]
+    assert len(set(names)) == len(names) and all(0 < len(text) < 480 for _, text in rows)
+    made = set()
+    for path in (ROOT / "src").rglob("*.f90"):
+        text = re.sub(r"&\s*\n\s*", "", path.read_text())
+        made |= set(re.findall(r"%(?:remarks%add|tell)\('([^']+)'", text))
+        if "remark_list" in text:
+            made |= set(re.findall(r"\bremarks%add\('([^']+)'", text))
+    joining = (ROOT / "python" / "fretwear" / "pieces" / "joining.py").read_text()
+    made |= set(re.findall(r"\(\"([a-z -]+)\", text\)", joining))
+    assert made == set(names)
+
+
+def test_every_message_of_the_table_is_said(fw_run):
+    """The words of a message between what differs stand in the sources."""
+    said = ""
+    for folder in ("src", "app"):
+        for path in (ROOT / folder).rglob("*.f90"):
+            if path.stem != "message_table":
+                said += re.sub(r"['\"] *// *&\s*\n\s*['\"]", "", path.read_text()).replace("''", "'")
+    for line in fw_run("--messages").stdout.splitlines()[2:]:
+        message, remedy = line.removeprefix("| ").removesuffix(" |").split(" | ")
+        assert 0 < len(message) < 128 and 0 < len(remedy) < 320
+        message = re.sub(r"^branch: |^the mode ended: ", "", message)
+        words = re.split(r"\.\.\.|(?<![\w%])-?\d[\d.E+-]*(?:, t1)?|x\.h5|'[^']*'|\w+%\w+", message)
+        assert max((part.strip() for part in words), key=len).rstrip(",:") in said, message
 
 
 def test_keys_for_programs_are_those_that_a_case_has(fw_run):
@@ -227,8 +260,8 @@ def test_a_list_of_frequencies_is_a_sweep_through_them(fw_run):
     h5py = pytest.importorskip("h5py")
     found = {}
     for name, sweep, more in (("sweep.h5", "start = 0.5 end = 0.8 n_points = 4", []),
-                              ("list.h5", "frequencies = 1, 2", [
-                                  "--set", "sweep%frequencies=0.5, 0.6, 0.7, 0.8"])):
+                              ("list.h5", "values = 1, 2", [
+                                  "--set", "sweep%values=0.5, 0.6, 0.7, 0.8"])):
         fw_run.write(f"&model n_dof = 1 mass = 1 stiffness = 1 damping = 0.1 /\n"
                      f"&load cosine = 1 /\n&sweep {sweep} /\n")
         done = fw_run(*more, "-o", name, "case.nml")

@@ -286,7 +286,7 @@ def test_a_frequency_named_twice_is_no_maximum(tmp_path):
     found = []
     for name, values in (("once", [0.9, 1.0, 1.1, 0.8]),
                          ("again", [0.9, 1.0, 1.0, 1.1, 0.8, 0.8, 1.0])):
-        run(tmp_path, merged(slider, {"sweep": {"frequencies": values}}), name=name)
+        run(tmp_path, merged(slider, {"sweep": {"values": values}}), name=name)
         found.append(read(tmp_path / f"{name}.h5"))
         assert len(found[-1]["omega"]) == len(values)
         assert remarks(tmp_path / f"{name}.h5") == []

@@ -24,7 +24,6 @@ CHOICES = {
         {**PLANE, "harmonics": {"n_harmonics": None, "accuracy": 1e-2}}, "events"),
     "asked for": ({**PLANE, "harmonics": {"sampling": "events"}}, "events"),
     "collocation": ({"harmonics": {"method": "tcm"}}, "uniform"),
-    "adaptive": ({"harmonics": {"adaptive": True}}, "uniform"),
     "histories": ({"output": {"histories": True}}, "uniform"),
     "stability": ({"sweep": {"stability": True}}, "uniform"),
     "wear": ({"case": {"analysis": "wear"}, "wear": {"coefficient": 1e-3, "n_cycles": 5.0}},

@@ -64,7 +64,7 @@ def run_at(folder, case, omegas, *, n_harmonics=None, sampling="events", n_time=
     groups["harmonics"] = {"n_harmonics": n_harmonics or case["n_harmonics"],
                            "sampling": sampling, "n_time": n_time}
     if analysis == "frf":
-        groups["sweep"] = {"frequencies": list(omegas)}
+        groups["sweep"] = {"values": list(omegas)}
     elif analysis != "modes":
         groups["sweep"] = {"start": omegas[0]}
     groups["solver"] = {"tolerance": TIGHT, **(solver or {})}

@@ -59,7 +59,7 @@ def solve(folder, case, omegas, sampling):
     """Coefficients and forces; rows that did not converge, or were not come to, are NaN."""
     groups = model_groups(case) | {
         "case": {"analysis": "frf", "threads": 1, "max_seconds": 60.0},
-        "sweep": {"frequencies": omegas}, "solver": {"tolerance": TIGHT},
+        "sweep": {"values": omegas}, "solver": {"tolerance": TIGHT},
         "harmonics": {"n_harmonics": N_HARMONICS, **sampling}}
     folder.mkdir(exist_ok=True)
     run(folder, groups, status=(0, 4, 6), seconds=300.0)

@@ -107,7 +107,7 @@ def test_matrices_of_nodal_diameters(tmp_path, phase):
                    "model": {"source": "hdf5", "file": "model.h5"},
                    "cyclic": {"engine_order": case["engine_order"]}, "contact": {"law": "dlft"},
                    "harmonics": {"n_harmonics": case["n_harmonics"], "sampling": "events"},
-                   "sweep": {"frequencies": OMEGAS}, "solver": {"tolerance": TIGHT}})
+                   "sweep": {"values": OMEGAS}, "solver": {"tolerance": TIGHT}})
     assert_same(read(tmp_path / "case.h5"), sector)
 
 
@@ -128,7 +128,7 @@ def test_reference_of_reduced_nodal_diameters(tmp_path):
                                              ("tangential_stiffness", "normal_stiffness")}},
             "harmonics": {"n_harmonics": case["n_harmonics"], "sampling": sampling,
                           "n_time": points[0][sampling].get("n_time", 0)},
-            "sweep": {"frequencies": [point["omega"] for point in points]},
+            "sweep": {"values": [point["omega"] for point in points]},
             "solver": {"tolerance": TIGHT}})
         found = read(tmp_path / "case.h5")
         for i, point in enumerate(points):
@@ -190,22 +190,18 @@ def test_work_of_the_load_is_dissipated_in_one_sector(tmp_path, law):
 
 
 @pytest.mark.parametrize("law", ["penalty", "dlft", "dlft_velocity", "rigid"])
-def test_linear_solvers_threads_and_derivatives(tmp_path, law):
+def test_linear_solvers_and_threads(tmp_path, law):
     case = some_case(9, law=law)
     found = {}
-    variants = {"lu": {"linear": "lu"}, "krylov": {"linear": "krylov"},
-                "difference": {"linear": "lu", "jacobian": "difference"}}
-    for name, solver in variants.items():
+    for name in ("lu", "krylov"):
         (tmp_path / name).mkdir()
-        found[name] = run_at(tmp_path / name, case, OMEGAS, solver={**solver, "tolerance": 1e-11})
+        found[name] = run_at(tmp_path / name, case, OMEGAS,
+                             solver={"linear": name, "tolerance": 1e-11})
     (tmp_path / "threads").mkdir()
     found["threads"] = run_at(tmp_path / "threads", case, OMEGAS, others={"case": {"threads": 2}},
                               solver={"linear": "lu", "tolerance": 1e-11})
     assert np.array_equal(found["threads"]["coefficients"], found["lu"]["coefficients"])
-    for name in ("krylov", "difference"):
-        assert difference(found[name]["coefficients"], found["lu"]["coefficients"]) < 1e-10
-    # Newton's method on the exact derivative is as fast as on differences.
-    assert np.all(found["lu"]["iterations"] <= found["difference"]["iterations"] + 2)
+    assert difference(found["krylov"]["coefficients"], found["lu"]["coefficients"]) < 1e-10
 
 
 def test_same_dof_of_neighbours_by_a_rigid_law_is_refused(tmp_path):

@@ -84,7 +84,7 @@ MODELS = {"sector": sector_model, "diameters": lambda case: nodal_model(case, Tr
 def settings(case):
     return {"cyclic": {"engine_order": case["engine_order"]}, "contact": {"law": "dlft"},
             "structure": {"rotation_speed": 0.7}, "harmonics": {"n_harmonics": 5},
-            "sweep": {"frequencies": OMEGAS}}
+            "sweep": {"values": OMEGAS}}
 
 
 def from_file(tmp_path, case, structure):

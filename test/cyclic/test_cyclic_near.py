@@ -35,7 +35,7 @@ def random_sector(seed, law):
                     **({"tangential_stiffness": 3.0, "normal_stiffness": 4.0}
                        if law == "penalty" else {})},
         "harmonics": {"n_harmonics": 2, "n_time": 64},
-        "sweep": {"frequencies": [1.1, 1.6, 2.3], "refine": False}}
+        "sweep": {"values": [1.1, 1.6, 2.3], "refine": False}}
 
 
 @pytest.mark.parametrize("law", ["penalty", "dlft"])

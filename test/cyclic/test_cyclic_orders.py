@@ -115,7 +115,7 @@ def test_matrices_of_nodal_diameters(tmp_path, scale):
                    "load": {"harmonic_scale": scale}, "contact": {"law": "dlft"},
                    "cyclic": {"engine_order": case["engine_order"]},
                    "harmonics": {"n_harmonics": case["n_harmonics"], "sampling": "events"},
-                   "sweep": {"frequencies": OMEGAS}, "solver": {"tolerance": TIGHT}})
+                   "sweep": {"values": OMEGAS}, "solver": {"tolerance": TIGHT}})
     found = read(tmp_path / "case.h5")
     assert difference(found["coefficients"], sector["coefficients"]) < SAME
     assert difference(found["contact/force"], sector["contact/force"]) < SAME
@@ -126,7 +126,7 @@ def test_orders_name_the_frequency_of_the_sweep(tmp_path):
     case = some_orders(5, (2, 3), law="penalty", n_sectors=7, n_pairs=1)
     case["engine_order"] = 2 * case["engine_order"]
     groups = model_groups(case) | {
-        "harmonics": {"n_harmonics": 5}, "sweep": {"frequencies": OMEGAS},
+        "harmonics": {"n_harmonics": 5}, "sweep": {"values": OMEGAS},
         "solver": {"tolerance": TIGHT}}
     by_order = groups | {"load": {**groups["load"]}}
     harmonics = by_order["load"].pop("term_harmonic")

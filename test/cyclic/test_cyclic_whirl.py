@@ -60,7 +60,7 @@ def groups_of(sector, **changes):
         "model": {"source": "hdf5", "file": "model.h5", "rotation_speed": sector["speed"]},
         "cyclic": {"engine_order": sector["engine_order"]},
         "harmonics": {"n_harmonics": sector["n_harmonics"], "sampling": "events"},
-        "sweep": {"frequencies": OMEGAS}, "solver": {"tolerance": TIGHT}}
+        "sweep": {"values": OMEGAS}, "solver": {"tolerance": TIGHT}}
     if sector.get("contact"):
         groups["contact"] = {"n_pairs": len(sector["contact"]["mu"]), "law": sector["law"],
                              **sector["contact"]}
@@ -280,10 +280,10 @@ def test_work_of_coriolis_forces_vanishes(tmp_path):
 def test_branch_follows_the_sweep(tmp_path, air):
     """Points of an arc-length branch, which takes the derivative by frequency."""
     case = whirling(1, air=air)
-    branch = solve(tmp_path, case, sweep={"frequencies": None, "start": 0.8, "end": 1.2,
+    branch = solve(tmp_path, case, sweep={"values": None, "start": 0.8, "end": 1.2,
                                           "continuation": "arclength"})
     assert branch["converged"].all() and len(branch["omega"]) > 3
-    sweep = solve(tmp_path, case, sweep={"frequencies": branch["omega"].tolist()})
+    sweep = solve(tmp_path, case, sweep={"values": branch["omega"].tolist()})
     assert difference(branch["coefficients"], sweep["coefficients"]) < 1e-6
 
 
@@ -375,7 +375,7 @@ def test_without_sectors(tmp_path):
     with h5py.File(tmp_path / "model.h5", "a") as file:
         del file["cyclic"]
     done = run(tmp_path, {"model": {"source": "hdf5", "file": "model.h5"},
-                          "sweep": {"frequencies": OMEGAS}}, status=3)
+                          "sweep": {"values": OMEGAS}}, status=3)
     assert "&cyclic" in done.stderr and "n_sectors = 1" in done.stderr
 
 
@@ -392,5 +392,5 @@ def test_model_in_memory(tmp_path):
         found = fretwear.run(Case(
             which, structure={"rotation_speed": case["speed"]},
             cyclic={"engine_order": case["engine_order"]},
-            harmonics={"n_harmonics": case["n_harmonics"]}, sweep={"frequencies": OMEGAS}))
+            harmonics={"n_harmonics": case["n_harmonics"]}, sweep={"values": OMEGAS}))
         assert difference(found.coefficients, expected) < LINEAR

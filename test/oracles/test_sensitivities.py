@@ -310,7 +310,6 @@ REFUSED = [
      "harmonics%accuracy"),
     ({"sensitivity": {"parameters": ["contact%mu"]}, "harmonics": {"method": "tcm"}},
      "harmonics%method"),
-    ({"sensitivity": {"parameters": ["contact%mu"]}, "harmonics": {"adaptive": True}}, "adaptive"),
     ({"sensitivity": {"parameters": ["contact%mu"]}, "contact": {"memory": "carried"}}, "memory"),
     ({"sensitivity": {"parameters": ["contact%mu"]}, "solver": {"kind": "powell"}}, "newton"),
     ({"sensitivity": {"parameters": ["contact%mu"]}, "case": {"analysis": "time"}}, "analysis"),

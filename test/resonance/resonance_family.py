@@ -59,7 +59,7 @@ def respond(folder, groups, omegas):
     run(folder, merged(groups, {
         "case": {"analysis": "frf"}, "resonance": dict.fromkeys(groups["resonance"]),
         "sensitivity": dict.fromkeys(groups["sensitivity"]),
-        "sweep": {"frequencies": list(omegas), "start": None, "end": None, "n_points": None}}),
+        "sweep": {"values": list(omegas), "start": None, "end": None, "n_points": None}}),
         name="responses", status=(0, 4), seconds=300)
     with h5py.File(folder / "responses.h5") as file:
         values = np.hypot(*file["coefficients"][:, 1:3, 0].T)

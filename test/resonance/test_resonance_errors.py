@@ -19,7 +19,6 @@ REFUSED = [
     ({"resonance": {"as": "factor", "parameter": "model%modal_damping"}}, "factor"),
     ({"harmonics": {"method": "tcm"}}, "hbm"),
     ({"harmonics": {"accuracy": 1e-3, "n_harmonics": None}}, "accuracy"),
-    ({"harmonics": {"adaptive": True}}, "adaptive"),
     ({"contact": {"memory": "carried"}}, "carried"),
     ({"solver": {"kind": "powell"}}, "newton"),
     ({"sweep": {"continuation": "arclength"}}, "natural"),

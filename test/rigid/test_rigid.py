@@ -103,7 +103,6 @@ def test_random_structures(tmp_path):
     ({"harmonics": {"method": "tcm"}}, "use 'hbm'"),
     ({"harmonics": {"sampling": "uniform"}}, "takes integrals between its events"),
     ({"output": {"tail": 20}, "contact": {"law": "dlft"}}, "output%tail"),
-    ({"output": {"tail": 20}, "harmonics": {"adaptive": True}}, "output%tail"),
 ])
 def test_what_it_does_not_go_with(tmp_path, changes, words):
     """Refused in words."""

@@ -16,7 +16,7 @@ PLANAR = {
     "load": {"cosine": [1.0, 0.3]}, "harmonics": {"n_harmonics": 5}, "sweep": {"start": 0.7}}
 #: What asks for instants, with the sampling that `groups` sets taken out.
 INSTANTS = [{"sampling": None, "n_time": 256}, {"sampling": "uniform"},
-            {"sampling": None, "adaptive": True}, {"sampling": None, "method": "tcm"}]
+            {"sampling": None, "method": "tcm"}]
 
 
 def solve(folder, case):

@@ -20,8 +20,6 @@ Floats = NDArray[np.float64]
 #: Difference of two solutions, relative to the largest of the rows, that is none: the tolerance of
 #: the solver times what a resonance may make of it.
 _SAME, _AMPLIFIED = 1e-5, 1e3
-#: What the response may be off over the part of the forces that is left out.
-_LEFT_OUT = 10.0
 #: Values below this part of the largest one are round-off.
 _NOTHING = 1e-9
 
@@ -84,10 +82,8 @@ def tolerance_of(values: dict[str, list[str]]) -> float:
     def real(key: str) -> float:
         return float(word(key).replace("d", "e"))
 
-    # Then the harmonics of a point depend on those before: twice what each may be off.
-    adaptive = word("harmonics%adaptive").strip(".").startswith("t")
-    return max(_SAME, _AMPLIFIED * real("solver%tolerance"), 2.0 * real("harmonics%accuracy"),
-               2.0 * _LEFT_OUT * real("harmonics%adaptive_tolerance") if adaptive else 0.0)
+    # With an accuracy the harmonics of a point depend on those before: twice what each may be off.
+    return max(_SAME, _AMPLIFIED * real("solver%tolerance"), 2.0 * real("harmonics%accuracy"))
 
 
 def agree(one: Part, other: Part) -> float:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from .._watching import (
     Progress,
     StopFlag,
     Tell,
-    run_watched,
     stop_reason,
     stops_on_interrupt,
     teller,
@@ -121,10 +120,6 @@ def _plan(values: dict[str, list[str]], frequencies: NDArray[np.float64]) -> _Pl
         raise InputError("workers: a sweep in pieces is a natural one of analysis = 'frf'; this "
                          f"is analysis = '{analysis}', continuation = '{continuation}': run it "
                          "without workers")
-    if any(_word(values, f"sweep%{key}") not in ("", usual) for key, usual in (
-            ("first_point", "1"), ("last_point", "0"), ("lead_points", "0"))):
-        raise InputError("workers: the case is a piece of a sweep already (sweep%first_point, "
-                         "last_point, lead_points): leave these out")
     places = frequencies
     if _word(values, "sweep%parameter") not in ("", "frequency"):
         listed = values.get("sweep%values", [])
@@ -134,8 +129,7 @@ def _plan(values: dict[str, list[str]], frequencies: NDArray[np.float64]) -> _Pl
     steps = np.diff(places)
     if not ((steps > 0.0).all() or (steps < 0.0).all()):
         raise InputError("workers: a sweep in pieces goes up or down all the way; this one does "
-                         "neither (sweep%frequencies, sweep%values): sort them, or run it "
-                         "without workers")
+                         "neither (sweep%values): sort them, or run it without workers")
     return _Plan(places, tolerance_of(values))
 
 
@@ -236,10 +230,9 @@ class _WorkElsewhere:
 
     def __call__(self, piece: Piece) -> list[Part]:
         started = time.monotonic()
-        first, last = piece.solved
-        sweep: Any = {"first_point": first, "last_point": last, "lead_points": piece.lead}
-        with self._case.replace(sweep=sweep, case={"threads": 1}).open() as session:
-            status, _ = run_watched(session, None, None, in_memory=True)
+        control = np.zeros(CONTROL, dtype=np.int64)
+        with self._case.open() as session:
+            status = session.run_piece(piece.solved, piece.lead, 0, control)
             return [_part(session, piece, status, started)]
 
 

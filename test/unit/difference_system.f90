@@ -1,6 +1,6 @@
-!> A system whose derivative comes from differences of its residual: to check an analytic one, or
-!> to do without. Only the preconditioner stays the system's own.
-module fw_difference_system
+!> A system whose derivative comes from differences of its residual, to check an analytic one. Only
+!> the preconditioner stays the system's own.
+module difference_system_module
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_parameter_system, only: parameter_system
@@ -179,4 +179,4 @@ contains
       end do
    end subroutine assemble
 
-end module fw_difference_system
+end module difference_system_module

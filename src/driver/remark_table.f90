@@ -1,0 +1,174 @@
+!> Every remark that a run may make, and when: a row each. `fw_run --remarks` lists them, the user
+!> guide has them from there, and a test holds that no source makes one that is not here.
+module fw_remark_table
+   implicit none (type, external)
+   private
+
+   public :: remark_kind, remark_kinds, write_remark_kinds
+
+   type :: remark_kind
+      !> By which programs know it.
+      character(28) :: name
+      !> What it is said of.
+      character(480) :: meaning
+   end type remark_kind
+
+   type(remark_kind), parameter :: remark_kinds(*) = [ &
+      remark_kind('negative stiffness', &
+                  'the stiffness is not positive, even with the joint held along its '// &
+                  'normals'), &
+      remark_kind('negative mass', &
+                  'the mass is not positive: entries off its diagonal or signs are wrong'), &
+      remark_kind('negative damping', &
+                  'the damping is not positive, as flutter may want it'), &
+      remark_kind('high friction', &
+                  'mu is above 2'), &
+      remark_kind('two directions', &
+                  'law = ''rigid'' with two tangential directions: not of high order there'), &
+      remark_kind('impact on mass', &
+                  'law = ''rigid'' with a normal dof that has mass: not of high order '// &
+                  'where it impacts'), &
+      remark_kind('law chosen', &
+                  'law was not given: ''rigid'' is taken, or ''dlft'' where something '// &
+                  'given asks for instants (n_time, sampling = ''uniform'', histories, a '// &
+                  'method other than hbm), or a pair has two tangential directions or a '// &
+                  'dof negative damping'), &
+      remark_kind('law under accuracy', &
+                  'with accuracy the named law (dlft, dlft_velocity) is solved as rigid, '// &
+                  'the same friction whose error is known'), &
+      remark_kind('few instants', &
+                  'law = ''regularised'': at some points velocities are so far above '// &
+                  'slip_speed that friction turns round between two instants (n_time below '// &
+                  '8 max abs(v)/v_0); not where an accuracy watches over the instants'), &
+      remark_kind('not read', &
+                  'the model file holds datasets, groups or attributes that nothing reads, '// &
+                  'see model files'), &
+      remark_kind('no pairs', &
+                  'a group &contact, but no pair that it could be about'), &
+      remark_kind('no springs', &
+                  'a group &spring, but no spring that it could be about'), &
+      remark_kind('gap not used', &
+                  'pairs have a gap and no normal dof'), &
+      remark_kind('constant not used', &
+                  'the model file has stiffnesses that law does not take'), &
+      remark_kind('no load', &
+                  'no vibratory load acts'), &
+      remark_kind('accuracy chosen', &
+                  'neither n_harmonics nor accuracy was given: a natural sweep or a point '// &
+                  'with contact or nonlinear springs takes accuracy = 1e-2, where nothing '// &
+                  'else given forbids it (n_time, histories, a method other than hbm, '// &
+                  'memory = ''carried''); steps of a session keep one harmonic'), &
+      remark_kind('one harmonic', &
+                  'contact or springs, and n_harmonics = 1'), &
+      remark_kind('too few harmonics', &
+                  'wear: a pair slips, and with 2H+1 harmonics it sticks or slips by less '// &
+                  'than half: it wears for want of harmonics (the finer the mesh, the more '// &
+                  'are needed)'), &
+      remark_kind('steady state not confirmed', &
+                  'wear: nothing wears any more with H harmonics, and a pair still does '// &
+                  'with 2H+1'), &
+      remark_kind('vibration jumps', &
+                  'wear: beyond a depth the vibration so far does not exist; which one the '// &
+                  'joint goes to was looked for without its motion'), &
+      remark_kind('slip begins', &
+                  'wear: how much a pair wears that begins to slip depends on the step, '// &
+                  'however short'), &
+      remark_kind('steps too long', &
+                  'wear: explicit steps of given size above 1/50 of the final depth: they '// &
+                  'overshoot a steady state by about half a step; other steps of first '// &
+                  'order above 1/5 of it, whose error nothing estimates'), &
+      remark_kind('profile depends on steps', &
+                  'wear: with check_steps, halved steps move the profile by more than 2 %'), &
+      remark_kind('derivatives of instants', &
+                  '&sensitivity with contact decided at instants: take sampling = '// &
+                  '''events'''), &
+      remark_kind('derivatives at held eps', &
+                  '&sensitivity by damping or rotation with a rigid law: its eps, which '// &
+                  'follows the matrices, is held: with few harmonics they may be far off'), &
+      remark_kind('one-sided derivatives', &
+                  '&sensitivity: points where a pair is at the onset of slip or contact'), &
+      remark_kind('tied peaks', &
+                  '&sensitivity: points where two peaks of a period are alike'), &
+      remark_kind('no derivatives', &
+                  '&sensitivity: points where the response folds'), &
+      remark_kind('several loads', &
+                  '&control: an amplitude that more than one load gives, as pairs stick or '// &
+                  'slip; which is found depends on where the search begins: follow the '// &
+                  'response over the load'), &
+      remark_kind('branches off', &
+                  'between two amplitudes of a nonlinear mode another curve branches off, '// &
+                  'as where equal parts begin to move apart: which one is followed may '// &
+                  'depend on the steps and the law (natural steps, up to 120 unknowns)'), &
+      remark_kind('fold below the start', &
+                  'the curve of a nonlinear mode turns back below mode%start: what begins '// &
+                  'there may be another part of it'), &
+      remark_kind('onset not reached', &
+                  'the curve of a nonlinear mode ended before mode%end with its pairs as '// &
+                  'at rest, or its first solution is above the onset: onset_amplitude is '// &
+                  'NaN as it is not known'), &
+      remark_kind('onset from below', &
+                  'a nonlinear mode sticks up to onset_amplitude, and no solution was '// &
+                  'found just above: it may part there and turn back to lower amplitudes'), &
+      remark_kind('no resonance', &
+                  'analysis = ''resonance'': the sweep has no maximum to follow; status 4'), &
+      remark_kind('lost resonance', &
+                  'analysis = ''resonance'': the resonance was lost before the last value; '// &
+                  'status 4'), &
+      remark_kind('corner at the resonance', &
+                  'analysis = ''resonance'': the maximum is a corner of the response at '// &
+                  'some values: its frequency is good to a millionth and has no derivative'), &
+      remark_kind('optimum', &
+                  'analysis = ''resonance'': the value between the ends at which the '// &
+                  'resonance is smallest'), &
+      remark_kind('another peak', &
+                  'a sweep of a joint that opens within the period: rows are so far apart '// &
+                  'that a resonance higher than all maxima may lie between them; analysis '// &
+                  '= ''resonance'': at the last value the sweep is larger elsewhere than '// &
+                  'at the resonance that was followed'), &
+      remark_kind('internal resonance', &
+                  'a nonlinear mode of which a harmonic meets the frequency of another '// &
+                  'mode with stuck or sliding pairs: a narrow tongue of the curve may be '// &
+                  'stepped over there'), &
+      remark_kind('no mode', &
+                  'no natural frequency of the free, sliding or stuck structure lies in '// &
+                  'the sweep: often Hz typed for rad/s'), &
+      remark_kind('undetermined mode', &
+                  'a harmonic meets, to round-off, a mode without damping that no load '// &
+                  'reaches, of the structure alone (within 1e-12) or with its linear '// &
+                  'springs and stuck pairs (within round-off of the sums of its matrices; '// &
+                  'up to 400 dofs): its motion is taken for none; a load on it makes the '// &
+                  'point fail. Not looked for in sectors, in sweeps over parameters of the '// &
+                  'matrices, and with harmonics%filter_harmonics. Set model%damping or '// &
+                  'model%modal_damping, or move the frequency'), &
+      remark_kind('peak at the end', &
+                  'the largest amplitude of a quantity is at an end of the sweep'), &
+      remark_kind('stability undecided', &
+                  'a multiplier is as near to the unit circle as its error: more harmonics '// &
+                  'make it certain'), &
+      remark_kind('peak not resolved', &
+                  'a maximum could not be followed to its top: more points, or arclength; '// &
+                  'where nothing but contact damps the structure, damping'), &
+      remark_kind('several solutions', &
+                  'pieces of a sweep (fretwear run --workers) came to different solutions '// &
+                  'of the same points: those of a sweep from the start were taken'), &
+      remark_kind('branch condensed', &
+                  'a small structure could not be taken whole where its branch begins: '// &
+                  'resonances that the unknowns of the joint do not show may be stepped '// &
+                  'over')]
+
+contains
+
+   !> The table as Markdown.
+   subroutine write_remark_kinds(unit)
+      !> Of a file, or of the standard output.
+      integer, intent(in) :: unit
+      integer :: i
+
+      write (unit, '(a)') '| name | said where |', '|---|---|'
+      do i = 1, size(remark_kinds)
+         write (unit, '(5a)') '| ', trim(remark_kinds(i)%name), ' | ', &
+            trim(remark_kinds(i)%meaning), ' |'
+      end do
+   end subroutine write_remark_kinds
+
+end module fw_remark_table
