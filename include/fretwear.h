@@ -93,7 +93,8 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
                   "contact/tangential_stiffness", "contact/normal_stiffness", "contact/slip_speed",
                   "contact/mu_dynamic", "contact/weakening_speed", "contact/weakening_exponent",
-                  "contact/mu_viscous", "contact/speed_1", "contact/speed_2"
+                  "contact/mu_viscous", "contact/speed_1", "contact/speed_2", "contact/iwan_chi",
+                  "contact/iwan_beta", "contact/bouc_wen_exponent", "contact/bouc_wen_beta"
    n_springs:     "spring/coefficient", as many as "spring/side_1" has dofs
    3 * n_pairs:   "contact/position", pair after pair
    m * n_dof:     "load/harmonic_cosine", "load/harmonic_sine", a load of m harmonics each, harmonic

@@ -7,6 +7,8 @@ Modules
 -------
 fretwear.model, fretwear.case, fretwear.settings
     The structure, and what is to be computed.
+fretwear.laws
+    Contact laws made of parallel pairs.
 fretwear.analyses
     Runs of the library in this process.
 fretwear.steps

@@ -47,7 +47,8 @@ class ContactPairs:
     normal_load : float or (n_pairs,), optional
         Constant compressive force of pairs without a normal dof [force].
     tangential_stiffness, normal_stiffness : float or (n_pairs,), optional
-        Stiffness of the elastic law ('penalty') [force/length].
+        Stiffness of the elastic law ('penalty') [force/length]; the tangential one also that of
+        the laws of hysteresis ('iwan', 'bouc_wen') for the smallest motion.
     slip_speed : float or (n_pairs,), optional
         Sliding velocity of smooth friction ('regularised') [length/s].
     mu_dynamic, weakening_speed, weakening_exponent : float or (n_pairs,), optional
@@ -57,6 +58,11 @@ class ContactPairs:
         What friction gains with the sliding speed [s/length] ('regularised').
     speed_1, speed_2 : float or (n_pairs,), optional
         Velocity of side 2 along t1 and t2 [length/s] ('regularised').
+    iwan_chi, iwan_beta : float or (n_pairs,), optional
+        Exponent of the sliding limits, above -1, and the stiffness that is lost at once where the
+        last elements slip over that lost before ('iwan').
+    bouc_wen_exponent, bouc_wen_beta : float or (n_pairs,), optional
+        n, 1 or 2, and the shape of the loops, 0.5 to 1 ('bouc_wen').
     law : str or sequence of str, optional
         The law of the pairs where a case does not name one: 'penalty', 'rigid', ..., or that of
         each (n_pairs).
@@ -84,6 +90,10 @@ class ContactPairs:
     mu_viscous: ArrayLike | None = None
     speed_1: ArrayLike | None = None
     speed_2: ArrayLike | None = None
+    iwan_chi: ArrayLike | None = None
+    iwan_beta: ArrayLike | None = None
+    bouc_wen_exponent: ArrayLike | None = None
+    bouc_wen_beta: ArrayLike | None = None
     law: str | Sequence[str] | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
@@ -470,7 +480,8 @@ _CONTACT = tuple(f"contact/{name}" for name in (
 #: Constants that a session takes as keys, so that one of another law is refused.
 _SLIDING = ("slip_speed", "mu_dynamic", "weakening_speed", "weakening_exponent", "mu_viscous",
             "speed_1", "speed_2")
-_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness", *_SLIDING)
+_HYSTERESIS = ("iwan_chi", "iwan_beta", "bouc_wen_exponent", "bouc_wen_beta")
+_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness", *_SLIDING, *_HYSTERESIS)
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
 

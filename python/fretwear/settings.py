@@ -175,9 +175,11 @@ class Contact(TypedDict, total=False):
 
     #: required with side_1; 0 switches the contact of a file off (default: of the file, else 0)
     n_pairs: int
-    #: rigid, rigid at velocity level, elastic, rigid of high order (friction on dofs with mass), or
-    #: smooth in the velocity (default: 'rigid' where it goes, else 'dlft')
-    law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised"] | Sequence[str]
+    #: rigid, rigid at velocity level, elastic, rigid of high order (friction on dofs with mass),
+    #: smooth in the velocity, joints of Iwan, of Bouc-Wen (default: 'rigid' where it goes, else
+    #: 'dlft')
+    law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised", "iwan",
+                 "bouc_wen"] | Sequence[str]
     #: dofs of t1, t2, n on one side; 0: none, negative: with its sign turned (default: of the file,
     #: else required)
     side_1: ArrayLike
@@ -198,7 +200,8 @@ class Contact(TypedDict, total=False):
     #: required with friction)
     normal_load: ArrayLike
     #: [F/L] contact stiffness; 0 with a parallel pair that has one, or without a tangential dof;
-    #: only: law = 'penalty' (default: of the file, else required with tangential dofs)
+    #: only: law = 'penalty', 'iwan', 'bouc_wen' (default: of the file, else required with
+    #: tangential dofs)
     tangential_stiffness: ArrayLike
     #: [F/L] contact stiffness; 0 without a normal dof; only: law = 'penalty', 'regularised'
     #: (default: of the file, else required with normal dofs)
@@ -220,6 +223,18 @@ class Contact(TypedDict, total=False):
     speed_1: ArrayLike
     #: [L/s] the same along t2; only: law = 'regularised' (default: 0)
     speed_2: ArrayLike
+    #: exponent of the sliding limits: the work of a small cycle grows with amplitude**(chi + 3);
+    #: only: law = 'iwan' (required with tangential dofs)
+    iwan_chi: ArrayLike
+    #: stiffness that is lost at once where the last elements slip, over that lost before; only: law
+    #: = 'iwan' (default: 0)
+    iwan_beta: ArrayLike
+    #: n of |z|**n, 1 or 2: how sharply the force turns to its limit; only: law = 'bouc_wen'
+    #: (default: 1)
+    bouc_wen_exponent: ArrayLike
+    #: shape of the loops: 0.5 unloads with the tangential stiffness, 1 with twice of it from the
+    #: limit; only: law = 'bouc_wen' (default: 0.5)
+    bouc_wen_beta: ArrayLike
     #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity', 'rigid'
     #: (default: 1)
     penalty_scale: float

@@ -208,6 +208,8 @@ contains
          asked = pairs .and. facts%needs_projection
       case ('a law without forces above the harmonics of the balance')
          asked = pairs .and. .not. facts%has_tail
+      case ('a law of hysteresis, whose paths start at the assembly')
+         asked = pairs .and. facts%is_hysteretic
       case ('a law without events, whose force is smooth')
          asked = pairs .and. .not. facts%has_events
       case ('a law that is not integrated in time')

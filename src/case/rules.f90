@@ -139,6 +139,8 @@ module fw_rules
                 "harmonics%method other than 'hbm'", "use 'hbm'"), &
       rule_type('a law that takes integrals between its events', &
                 "harmonics%sampling = 'uniform'", "leave it out, or take 'events'"), &
+      rule_type("contact%memory = 'carried'", &
+                'a law of hysteresis, whose paths start at the assembly', "use 'assembly'"), &
       rule_type('output%tail', 'a law without forces above the harmonics of the balance', &
                 "use contact%law = 'rigid'"), &
       rule_type('output%tail', 'pairs with two tangential directions', 'leave it out'), &

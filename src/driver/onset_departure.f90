@@ -50,12 +50,14 @@ contains
       call system%balance%pair_shares(self%rest)
    end subroutine begin
 
-   !> Whether a pair parts and meets in the smallest motion.
+   !> Whether a pair parts and meets in the smallest motion, or slips throughout: the joints of
+   !> Iwan and of Bouc and Wen do.
    pure logical function at_every_amplitude(self)
       class(onset_departure), intent(in) :: self
 
       at_every_amplitude = any(self%rest(3, :) > share_change .and. &
-                               self%rest(3, :) < 1.0_wp - share_change)
+                               self%rest(3, :) < 1.0_wp - share_change) .or. &
+                           any(self%mu > 0.0_wp .and. self%rest(2, :) >= 1.0_wp - share_change)
    end function at_every_amplitude
 
    !> Largest change of a share from that at rest, where the system stands; none where it is

@@ -10,6 +10,7 @@
 !>
 !> Nobody asks a law by its name: who needs to know something of it reads `facts` or `prediction`.
 module fw_force_law
+   use fw_displacement_path, only: displacement_path
    use fw_fft, only: fft_type
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
@@ -84,6 +85,9 @@ module fw_force_law
       logical :: locates_events = .false.
       !> Its forces are the projection of their histories alone, not a collocation.
       logical :: needs_projection = .false.
+      !> It follows from the turning points of one tangential displacement, under a constant normal
+      !> load and from the assembly on: pairs have no other component.
+      logical :: is_hysteretic = .false.
       !> Sliding under pressure, with its derivative: what wear takes. The law leaves both in its
       !> workspace where that asks for them (`work%slip`, `work%slip_derivative`).
       logical :: measures_slip = .false.
@@ -154,6 +158,10 @@ module fw_force_law
       !> Angular frequency of the period: makes a derivative by tau one by t.
       real(wp) :: rate = 1.0_wp
       class(law_room), allocatable :: room
+      !> Of laws of hysteresis: the path of each element, and points and weights of the rules that
+      !> integrate along it.
+      type(displacement_path), allocatable :: path(:)
+      real(wp), allocatable :: rule(:, :)
       !> Plans and buffers of long transforms, where there are such.
       type(fft_type), allocatable :: fft
    contains

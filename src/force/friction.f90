@@ -11,10 +11,9 @@ module fw_friction
    use fw_contact_data, only: contact_type
    use fw_fourier, only: fourier_type
    use fw_friction_events, only: follow_events
-   use fw_key, only: key, key_visitor
-   use fw_key_range, only: at_least
+   use fw_key, only: key_visitor
    use fw_kinds, only: wp
-   use fw_pair_law, only: normal_stiffness_key, pair_law
+   use fw_pair_law, only: normal_stiffness_key, pair_law, tangential_stiffness_key
    use fw_sampled_turn, only: settle_samples
    use fw_settling, only: periodic_tolerance, shakedown_turns
    use fw_slip, only: slip_work
@@ -112,9 +111,7 @@ contains
       logical, intent(in) :: slides, closes
 
       if (self%prediction%takes_balance) return
-      call contact%constants%bind(keys, key('tangential_stiffness', 'contact stiffness; '// &
-         '0 with a parallel pair that has one, or without a tangential dof', at_least(0.0_wp), &
-         'F/L', 'n_pairs', absent='of the file, else required with tangential dofs'), slides)
+      call contact%constants%bind(keys, tangential_stiffness_key(), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
    end subroutine bind_keys
 

@@ -1,9 +1,11 @@
 !> The laws of contact pairs by their words: a new law is a word and a line here, and a file of its
 !> own. Pairs of one case may have different ones.
 module fw_laws
+   use fw_bouc_wen, only: bouc_wen_friction
    use fw_contact_data, only: contact_type
    use fw_force_law, only: law_facts
    use fw_friction, only: elastic_friction, rigid_friction, rigid_friction_of_rates
+   use fw_iwan, only: iwan_friction
    use fw_pair_law, only: pair_law
    use fw_regularised, only: regularised_friction
    use fw_rigid_law, only: friction_of_high_order
@@ -12,13 +14,15 @@ module fw_laws
    private
 
    public :: law_words, law_help, law_number, new_law, build_law, laws_of, pairs_of_law, facts_of
-   public :: is_rigid, pairs_are_rigid, law_under_accuracy, usual_law, is_of_high_order, is_viscous
+   public :: is_rigid, pairs_are_rigid, pairs_are_hysteretic, law_under_accuracy, usual_law
+   public :: is_of_high_order, is_viscous
 
    character(*), parameter :: law_words(*) = &
-      [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
+      [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised', &
+                        'iwan', 'bouc_wen']
    !> What they are, in the same order, for the key `law` (160 characters).
    character(*), parameter :: law_help = 'rigid, rigid at velocity level, elastic, rigid of '// &
-      'high order (friction on dofs with mass), or smooth in the velocity'
+      'high order (friction on dofs with mass), smooth in the velocity, joints of Iwan, of Bouc-Wen'
 
 contains
 
@@ -32,6 +36,8 @@ contains
       case ('penalty'); allocate (law, source=elastic_friction())
       case ('rigid'); allocate (law, source=friction_of_high_order())
       case ('regularised'); allocate (law, source=regularised_friction())
+      case ('iwan'); allocate (law, source=iwan_friction())
+      case ('bouc_wen'); allocate (law, source=bouc_wen_friction())
       case default; allocate (law, source=rigid_friction())
       end select
    end subroutine new_law
@@ -156,6 +162,22 @@ contains
          rigid(pairs_of_law(contact, numbers(k))) = law_is_rigid(numbers(k))
       end do
    end function pairs_are_rigid
+
+   !> Whether the law of each pair takes one tangential direction under a constant load alone
+   !> (n_pairs).
+   function pairs_are_hysteretic(contact) result(are)
+      type(contact_type), intent(in) :: contact
+      logical :: are(contact%n_pairs)
+      type(law_facts) :: facts
+      integer, allocatable :: numbers(:)
+      integer :: k
+
+      numbers = laws_of(contact)
+      do k = 1, size(numbers)
+         facts = facts_of_law(numbers(k))
+         are(pairs_of_law(contact, numbers(k))) = facts%is_hysteretic
+      end do
+   end function pairs_are_hysteretic
 
    !> Whether some pairs of a case are rigid; of a case without pairs, what its law is.
    logical function is_rigid(contact)

@@ -9,7 +9,7 @@ module fw_pair_law
    implicit none (type, external)
    private
 
-   public :: pair_law, normal_stiffness_key
+   public :: pair_law, normal_stiffness_key, tangential_stiffness_key
 
    type, abstract, extends(force_law) :: pair_law
       !> Friction coefficient (n_elements).
@@ -69,6 +69,14 @@ contains
                                  'dof', at_least(0.0_wp), 'F/L', 'n_pairs', &
                                  absent='of the file, else required with normal dofs')
    end function normal_stiffness_key
+
+   !> The key of what holds pairs tangentially, which several laws have.
+   pure type(key_type) function tangential_stiffness_key()
+      tangential_stiffness_key = key('tangential_stiffness', 'contact stiffness; 0 with a '// &
+                                     'parallel pair that has one, or without a tangential dof', &
+                                     at_least(0.0_wp), 'F/L', 'n_pairs', &
+                                     absent='of the file, else required with tangential dofs')
+   end function tangential_stiffness_key
 
    !> Take what `bind_keys` declared, once the pairs are there.
    subroutine take_constants(self, contact)

@@ -127,6 +127,7 @@ contains
       shared%locates_events = any(facts%locates_events) .and. &
                               all(facts%locates_events .or. .not. facts%has_events)
       shared%needs_projection = any(facts%needs_projection)
+      shared%is_hysteretic = any(facts%is_hysteretic)
       shared%measures_slip = all(facts%measures_slip)
       shared%has_tail = all(facts%has_tail)
       ! Multipliers are found by marching one law.

@@ -9,7 +9,7 @@ module fw_read_contact
    use fw_key_range, only: range_type
    use fw_kinds, only: wp
    use fw_law_text, only: law_text
-   use fw_laws, only: law_words, laws_of, is_rigid
+   use fw_laws, only: law_words, laws_of, is_rigid, pairs_are_hysteretic
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_text_list, only: name_sectors
@@ -242,7 +242,43 @@ contains
       if (reader%failed()) return
       if (contact%constants%has('normal_stiffness')) call check_normal_zeros(reader, contact)
       if (contact%constants%has('tangential_stiffness')) call check_zeros(reader, contact)
+      call check_hysteresis(reader, contact)
    end subroutine read_law
+
+   !> Laws of hysteresis have one direction, and what presses is a constant.
+   subroutine check_hysteresis(reader, contact)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(in) :: contact
+      logical, dimension(contact%n_pairs) :: are, normal
+      real(wp) :: exponent(contact%n_pairs)
+      integer :: i
+
+      are = pairs_are_hysteretic(contact)
+      normal = has_normal(contact)
+      exponent = contact%constants%get('bouc_wen_exponent', contact%n_pairs, 1.0_wp)
+      do i = 1, contact%n_pairs
+         if (.not. are(i)) cycle
+         associate (a => contact%side_1(:, i), b => contact%side_2(:, i))
+            if (normal(i) .or. a(t2) /= 0 .or. b(t2) /= 0) then
+               call refuse_pair(reader, i, "has a law ('iwan', 'bouc_wen') of one tangential "// &
+                                'direction (t1) under a constant normal_load: t2 and n must be '// &
+                                "0; for others use parallel 'penalty' pairs "// &
+                                '(fretwear.laws.iwan_pairs)')
+               return
+            end if
+         end associate
+         if (.not. contact%tangential_stiffness(i) > 0.0_wp) then
+            call reader%refuse('contact', 'tangential_stiffness', '= '// &
+                               to_text(contact%tangential_stiffness(i))//' for pair '// &
+                               to_text(i)//": must be above 0 with law = 'iwan' or 'bouc_wen'")
+            return
+         end if
+         if (any(abs(exponent(i) - [1.0_wp, 2.0_wp]) <= 0.0_wp)) cycle
+         call reader%refuse('contact', 'bouc_wen_exponent', '= '//to_text(exponent(i))// &
+                            ' for pair '//to_text(i)//': must be 1 or 2')
+         return
+      end do
+   end subroutine check_hysteresis
 
    !> Values count where the law of the pair takes them.
    subroutine check_values(reader, contact)

@@ -49,8 +49,8 @@ def add_law(toy):
         text = text.replace(old, new)
     toy.new("src/force/toy_law.f90", text)
     toy.change("src/force/laws.f90",
-               ("'rigid', 'regularised']", "'rigid', 'regularised', 'toy']"),
-               ("smooth in the velocity'", "smooth in the velocity, or a toy'"),
+               ("'iwan', 'bouc_wen']", "'iwan', 'bouc_wen', 'toy']"),
+               ("joints of Iwan, of Bouc-Wen'", "joints of Iwan, of Bouc-Wen, toy'"),
                ("   use fw_rigid_law,",
                 "   use fw_toy_law, only: toy_friction\n   use fw_rigid_law,"),
                ("      case ('rigid');",
