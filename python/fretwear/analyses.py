@@ -172,7 +172,7 @@ def frf(model: ModelLike, start: float | None = None, end: float | None = None,
     return run(case, file, check=check, progress=progress)
 
 
-def wear(model: ModelLike, frequency: float, coefficient: float,
+def wear(model: ModelLike, frequency: float, coefficient: ArrayLike,
          n_cycles: float | None = None, *,
          scheme: Literal["explicit", "implicit", "pseudo_time"] | None = None,
          unit: Literal["rad/s", "Hz"] | None = None, file: str | Path | None = None,
@@ -186,8 +186,9 @@ def wear(model: ModelLike, frequency: float, coefficient: float,
         The structure, or the path of a model file; its pairs have areas.
     frequency : float
         Frequency of the excitation [unit].
-    coefficient : float
-        Archard's coefficient [length^2/force], in the units of the model.
+    coefficient : float or array
+        Archard's coefficient [length^2/force], in the units of the model; one for all pairs or one
+        for each.
     n_cycles : float, optional
         Cycles of vibration; until the joint is steady without it.
     scheme : {'explicit', 'implicit', 'pseudo_time'}, optional
@@ -197,12 +198,15 @@ def wear(model: ModelLike, frequency: float, coefficient: float,
     file, check, progress
         See `run`.
     **groups
-        Further settings by group, see `Case`; such as ``wear={"max_depth_step": 1e-4}``.
+        Further settings by group, see `Case`; such as ``wear={"max_depth_step": 1e-4}``, or
+        ``mission={"n_blocks": 2, "cycles": [1e4, 1e5], "change": ["", "sweep%start = 900"],
+        "n_flights": 100}`` in place of `n_cycles`.
 
     Returns
     -------
     Result
-        With `cycles`, `depth`, `rate` and `steady_state`; one row per wear step.
+        With `cycles`, `depth`, `rate` and `steady_state`; one row per wear step, or per block of
+        a mission.
 
     Raises
     ------

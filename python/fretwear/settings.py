@@ -13,8 +13,8 @@ from typing import Literal, TypedDict
 from numpy.typing import ArrayLike
 
 __all__ = ["UNITS", "CaseGroup", "Contact", "Control", "Cyclic", "Groups", "Harmonics", "Load",
-           "Mode", "Output", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring",
-           "Structure", "Sweep", "Time", "Wear"]
+           "Mission", "Mode", "Output", "PseudoTime", "Resonance", "Sensitivity", "Solver",
+           "Spring", "Structure", "Sweep", "Time", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -416,7 +416,7 @@ class Wear(TypedDict, total=False):
     #: 'implicit', 'explicit' (default: 0)
     order: int
     #: [L^2/F] k_w: depth is k_w times contact force times slip over area (required for wear)
-    coefficient: float
+    coefficient: ArrayLike
     #: cycles to be covered (default: none)
     n_cycles: float
     #: [L] largest growth of the depth in a step; 0: by the error alone (default: 0)
@@ -433,6 +433,25 @@ class Wear(TypedDict, total=False):
     check_steps: bool
     #: keep the frequency at the peak of the first observed quantity (default: .false.)
     follow_resonance: bool
+
+
+class Mission(TypedDict, total=False):
+    """Group &mission: wear over blocks of cycles in other conditions."""
+
+    #: blocks of a flight; 0: no mission; only: analysis = 'wear' (default: 0)
+    n_blocks: int
+    #: cycles of each block in a flight (required with n_blocks)
+    cycles: ArrayLike
+    #: how often all blocks are flown (default: 1)
+    n_flights: int
+    #: what each block changes in the case, as --set takes it; several parted by semicolons
+    #: (default: nothing)
+    change: ArrayLike
+    #: of each block (default: block 1, block 2, ..)
+    name: ArrayLike
+    #: flights that are taken together; 1: all in their order, 0: as many as wear%error_tolerance
+    #: allows (default: 0)
+    flights_per_jump: int
 
 
 class Time(TypedDict, total=False):
@@ -522,6 +541,7 @@ class Groups(TypedDict, total=False):
     solver: Solver
     pseudo_time: PseudoTime
     wear: Wear
+    mission: Mission
     time: Time
     mode: Mode
     output: Output

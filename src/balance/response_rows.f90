@@ -59,7 +59,7 @@ contains
       !> Quantities that are wanted, in this order.
       integer, intent(in) :: quantities(:)
       !> Friction coefficients (n_pairs), and k_w [area/force].
-      real(wp), intent(in) :: mu(:), wear_coefficient
+      real(wp), intent(in) :: mu(:), wear_coefficient(:)
       !> Whether wear follows the energy, whatever mu is.
       logical, intent(in) :: by_energy
       type(response_row), allocatable, intent(out) :: rows(:)
@@ -138,7 +138,7 @@ contains
    subroutine set_work(state, x, mu, wear_coefficient, by_energy, row)
       type(balance_state), intent(in) :: state
       real(wp), intent(in), contiguous :: x(:)
-      real(wp), intent(in) :: mu(:), wear_coefficient
+      real(wp), intent(in) :: mu(:), wear_coefficient(:)
       logical, intent(in) :: by_energy
       type(response_row), intent(inout) :: row
       real(wp) :: weight(size(mu)), work(size(mu))

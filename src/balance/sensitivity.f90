@@ -37,9 +37,8 @@ module fw_sensitivity
       type(parameter_entry), allocatable :: parameters(:)
       !> As in quantity_words.
       integer, allocatable :: quantities(:)
-      !> Friction coefficients (n_pairs), and k_w [area/force].
-      real(wp), allocatable :: mu(:)
-      real(wp) :: wear_coefficient = 0.0_wp
+      !> Friction coefficients, and k_w [area/force] (n_pairs).
+      real(wp), allocatable :: mu(:), wear_coefficient(:)
       !> Whether the volume is that coefficient times the energy, not times the energy over mu.
       logical :: wears_by_energy = .false.
       integer :: way = by_counts

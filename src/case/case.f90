@@ -5,6 +5,7 @@ module fw_case
    use fw_key, only: key, key_visitor
    use fw_key_range, only: at_least, from_to
    use fw_kinds, only: wp
+   use fw_mission_options, only: mission_options
    use fw_mode_options, only: mode_options
    use fw_parameter_sweep, only: parameter_sweep
    use fw_control_options, only: control_options
@@ -86,6 +87,8 @@ module fw_case
       type(solver_options) :: solver
       type(pseudo_time_options) :: pseudo_time
       type(wear_options) :: wear
+      !> Blocks that wear in turn, in place of the cycles of one.
+      type(mission_options) :: mission
       type(time_options) :: time
       type(output_options) :: output
       !> The effective input, as a namelist.

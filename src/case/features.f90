@@ -92,6 +92,8 @@ contains
          asked = a == analysis_resonance .and. case%resonance%parameter == rotation_speed
       case ("case%analysis = 'wear'")
          asked = a == analysis_wear
+      case ("case%analysis other than 'wear'")
+         asked = a /= analysis_wear
       case ("case%analysis other than 'frf'")
          asked = a /= analysis_frf
       case ("case%analysis other than 'frf' or 'point'")
@@ -245,6 +247,12 @@ contains
       select case (phrase)
       case ('wear%follow_resonance = .true.')
          asked = case%analysis == analysis_wear .and. case%wear%follow_resonance
+      case ('group &mission')
+         asked = case%mission%is_wanted()
+      case ('wear%n_cycles')
+         asked = case%wear%n_cycles < huge(1.0_wp)
+      case ('wear%check_steps = .true.')
+         asked = case%wear%check_steps
       case ('wear%error_tolerance')
          asked = case%analysis == analysis_wear .and. case%wear%error_tolerance > 0.0_wp
       case ("wear by pseudo_time%scheme = 'bdf', which builds on earlier steps")

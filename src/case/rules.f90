@@ -166,7 +166,15 @@ module fw_rules
                 "wear is stiff: use 'implicit_euler', 'rosenbrock' or 'bdf'"), &
       rule_type('wear%error_tolerance', "wear by pseudo_time%scheme = 'implicit_euler'", &
                 'it estimates no error: give wear%max_depth_step, or use '// &
-                "'rosenbrock' or 'bdf'")]
+                "'rosenbrock' or 'bdf'"), &
+      rule_type('group &mission', "case%analysis other than 'wear'", "use 'wear'"), &
+      rule_type('group &mission', 'wear%n_cycles', 'mission%cycles has those of each block'), &
+      rule_type('group &mission', &
+                "wear by pseudo_time%scheme = 'bdf', which builds on earlier steps", &
+                "use 'rosenbrock', or wear%scheme = 'implicit'"), &
+      rule_type('group &mission', 'wear%check_steps = .true.', &
+                'leave it out, and compare with a smaller wear%error_tolerance'), &
+      rule_type('group &mission', "contact%memory = 'carried'", "use 'assembly'")]
 
    type(rule_type), parameter :: of_stress(*) = [ &
       rule_type('group &stress', "harmonics%method = 'hdhb'", "use 'hbm'"), &

@@ -9,6 +9,7 @@ module fw_run
    use fw_error, only: error_type
    use fw_frequency_response, only: response_analysis
    use fw_kinds, only: wp
+   use fw_mission_response, only: mission_analysis
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_problem, only: threads_for
@@ -40,7 +41,9 @@ contains
       case (analysis_modes); allocate (modes_analysis :: work)
       case (analysis_mode); allocate (mode_analysis :: work)
       case (analysis_resonance); allocate (resonance_analysis :: work)
-      case (analysis_wear); allocate (wear_analysis :: work)
+      case (analysis_wear)
+         if (case%mission%is_wanted()) allocate (mission_analysis :: work)
+         if (.not. allocated(work)) allocate (wear_analysis :: work)
       case default; allocate (response_analysis :: work)
       end select
    end subroutine new_analysis

@@ -158,7 +158,8 @@ contains
          end do
          finder%mu = spread(0.0_wp, 1, case%contact%n_pairs)
          if (case%contact%n_pairs > 0) finder%mu = case%contact%mu
-         finder%wear_coefficient = max(case%wear%coefficient, 0.0_wp)
+         finder%wear_coefficient = 0.0_wp*finder%mu
+         if (allocated(case%wear%coefficient)) finder%wear_coefficient = case%wear%coefficient
          finder%wears_by_energy = case%wear%law == wear_energy
       end associate
       self%is_started = .true.

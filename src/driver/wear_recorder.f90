@@ -38,6 +38,7 @@ module fw_wear_recorder
       type(describer) :: about
    contains
       procedure :: take
+      procedure :: make_point
       procedure :: begin_slip
       procedure :: find
       procedure :: allowed_residual
@@ -56,11 +57,39 @@ contains
       logical, intent(out) :: go_on
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
+
+      go_on = .false.
+      call self%make_point(system, state, iterations, point, error)
+      if (allocated(error)) return
+      ! The pairs that slip before anything is worn.
+      if (self%n_rows == 0) call self%finer%look(self%case, march, system, state, &
+                                                 state%rate > 0.0_wp)
+      call self%about%note_seconds(point)
+      call self%restart_rows%append(self%run%writer%file, march, &
+                                    state%x(:system%n_vibration()), point%converged, &
+                                    self%finer%notes(), error)
+      if (allocated(error)) return
+      call self%run%writer%add_point(point, error)
+      if (allocated(error)) return
+      self%n_rows = self%n_rows + 1
+      call self%count_point(point)
+      call self%run%observer%on_point(self%n_rows, 0, point)
+      go_on = .not. self%run%observer%stop_requested
+   end subroutine take
+
+   !> What a row says of a state; the friction energy up to it.
+   subroutine make_point(self, system, state, iterations, point, error)
+      class(wear_recorder), intent(inout) :: self
+      !> Evaluated at the state.
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: state
+      integer, intent(in) :: iterations
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
       type(point_request) :: request
       type(solver_report) :: report
       integer :: n
 
-      go_on = .false.
       n = system%n_vibration()
       request = new_request(self%case, system%vibration%frequency())
       ! Energy is that of the forces, whether these are written or not.
@@ -83,20 +112,7 @@ contains
       if (.not. self%case%output%contact) then
          deallocate (point%force, point%fraction, point%dissipation)
       end if
-      ! The pairs that slip before anything is worn.
-      if (self%n_rows == 0) call self%finer%look(self%case, march, system, state, &
-                                                 state%rate > 0.0_wp)
-      call self%about%note_seconds(point)
-      call self%restart_rows%append(self%run%writer%file, march, state%x(:n), point%converged, &
-                                    self%finer%notes(), error)
-      if (allocated(error)) return
-      call self%run%writer%add_point(point, error)
-      if (allocated(error)) return
-      self%n_rows = self%n_rows + 1
-      call self%count_point(point)
-      call self%run%observer%on_point(self%n_rows, 0, point)
-      go_on = .not. self%run%observer%stop_requested
-   end subroutine take
+   end subroutine make_point
 
    !> Pairs begin to slip: only for want of harmonics?
    subroutine begin_slip(self, march, system, state, error)

@@ -1,42 +1,31 @@
 !> Analysis 'wear': the joint wears over the cycles at the first frequency of the sweep.
 module fw_wear_response
-   use fw_combinations, only: is_linear_euler
    use fw_analysis, only: analysis, run_type
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
-   use fw_balance_problem, only: balance_problem
-   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
-   use fw_point_solver, only: point_solver
-   use fw_problem, only: build_system
    use fw_hdf5, only: hdf5_file
    use fw_remarks, only: remark_undetermined
    use fw_resonance, only: resonance_type
    use fw_restart_file, only: restart_type
    use fw_restart_rows, only: c_noted
-   use fw_strategy, only: new_request, note_time_limit
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    use fw_wear_march, only: steady_not_reached, steady_reached, steady_words, wear_march, &
       wear_observer
-   use fw_wear_options, only: wear_energy, wear_explicit, wear_pseudo_time
+   use fw_wear_joint, only: stand_at, wear_joint
+   use fw_wear_options, only: wear_explicit, wear_pseudo_time
    use fw_wear_recorder, only: friction_energy, wear_recorder
    use fw_wear_group, only: wear_halved, wear_outcome, wear_patches
    use fw_wear_step, only: new_wear_stepper, wear_state
-   use fw_wear_system, only: new_wear_system, wear_system
+   use fw_wear_system, only: wear_system
    implicit none (type, external)
    private
 
-   public :: wear_analysis
-
-   !> Largest growth of the depth in a step where the scheme estimates no error and the case names
-   !> none, as a part of the depth scale.
-   real(wp), parameter :: depth_step = 5.0e-2_wp
-   !> The same as a part of the depth, which a scar that keeps growing leaves behind.
-   real(wp), parameter :: relative_step = 2.0e-2_wp
+   public :: remark_steps, wear_analysis
 
    !> Part of the largest depth by which halved steps may move a profile without a remark.
    real(wp), parameter :: large_change = 2.0e-2_wp
@@ -52,15 +41,10 @@ module fw_wear_response
 
    type, extends(analysis) :: wear_analysis
       private
-      !> The vibration at fixed depths, and vibration and depth as one system over it.
-      type(balance_problem) :: problem
-      type(balance_state) :: balance
-      type(wear_system) :: system
-      type(point_solver) :: solver
+      type(wear_joint) :: joint
       type(wear_recorder) :: recorder
-      type(wear_march) :: march
-      !> Where the run stands, and where it started.
-      type(wear_state) :: state, first
+      !> Where the run started.
+      type(wear_state) :: first
       real(wp) :: first_omega = 0.0_wp
    contains
       procedure :: start
@@ -76,11 +60,10 @@ contains
       type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
 
-      call build_system(case, self%problem, self%balance, error, held=self%recorder%finer%held)
+      call self%joint%build(case, error, held=self%recorder%finer%held)
       if (.not. allocated(error)) call start_recorder(self%recorder, case, run, error)
       if (allocated(error)) return
       call run%begin_points(case, self, 0)
-      call self%solver%start(case, case%harmonics, self%balance%n)
    end subroutine start
 
    !> The vibration of the unworn joint, then the march, which hands its rows on by itself: every
@@ -93,16 +76,11 @@ contains
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
 
-      more = .not. allocated(self%march%ending)
+      more = .not. allocated(self%joint%march%ending)
       if (.not. more) return
-      call observer%limit_point(case%solver%max_seconds)
-      call self%solver%solve(case, self%balance, new_request(case, case%sweep%start, observer), &
-                             point, error)
+      call self%joint%solve(case, observer, point, error)
       if (allocated(error)) return
-      if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
-      call observer%limit_point(0.0_wp)
-      if (allocated(point%note)) call observer%on_message(point%note)
-      call remark_undetermined(self%solver%method%undetermined, &
+      call remark_undetermined(self%joint%solver%method%undetermined, &
                                self%recorder%run%summary%remarks)
       more = .not. point%converged
       if (more) then
@@ -113,7 +91,7 @@ contains
          if (.not. allocated(error)) call march_on(self, self%recorder%run%restart, error)
          call self%recorder%restart_rows%close()
       end if
-      self%falls_short = .not. self%march%complete
+      self%falls_short = .not. self%joint%march%complete
    end subroutine next
 
    subroutine conclude(self, case, run, error)
@@ -123,12 +101,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       ! A stop before the first state leaves nothing to tell.
-      if (.not. allocated(self%march%ending)) return
+      if (.not. allocated(self%joint%march%ending)) return
       call report_end(self, run%restart, error)
       if (.not. allocated(error) .and. case%wear%check_steps .and. allocated(self%first%x)) then
          ! Last, because it uses the system of the run for itself.
-         call compare_halved(self%recorder, self%system, self%march, self%first, &
-                             self%first_omega, self%state, error)
+         call compare_halved(self%recorder, self%joint%system, self%joint%march, self%first, &
+                             self%first_omega, self%joint%state, error)
       end if
    end subroutine conclude
 
@@ -159,30 +137,12 @@ contains
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
 
-      call new_wear_system(self%balance, case%contact, case%wear%coefficient, &
-                           case%wear%law == wear_energy, self%system)
-      self%balance%interrupt => self%recorder%run%observer
-      self%system%interrupt => self%recorder%run%observer
-      call first_state(self%system, self%solver%x, point, self%state)
-      associate (march => self%march)
-         march%options = case%wear
-         if (needs_depth_step(case)) then
-            march%options%max_depth_step = depth_step*self%system%depth_scale()
-            march%options%relative_step = relative_step
-         end if
-         march%stepper = new_wear_stepper(march%options, case%pseudo_time%scheme, &
-                                          self%solver%method%newton)
-         ! Also where it is not followed: the march has no case for its absence.
-         march%resonance = resonance_type(n_harmonics=case%harmonics%n_harmonics, &
-                                          first=case%sweep%start)
-         if (case%wear%follow_resonance) then
-            call march%resonance%follow(march%stepper, self%system, self%state, point%iterations, &
-                                         error)
-         end if
-      end associate
+      call self%joint%prepare(case, self%recorder%run%observer)
+      call self%joint%take_solution(point%residual)
+      call self%joint%begin_march(case, point%iterations, error)
       ! Where check_steps starts once more.
-      self%first = self%state
-      self%first_omega = self%system%vibration%frequency()
+      self%first = self%joint%state
+      self%first_omega = self%joint%system%vibration%frequency()
    end subroutine start_march
 
    !> The march to its end, and why it ended.
@@ -192,21 +152,22 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: reason
 
-      associate (recorder => self%recorder)
+      associate (recorder => self%recorder, joint => self%joint)
          call recorder%restart_rows%create(recorder%run%writer%file, recorder%case%contact, &
-                                           self%system%n_vibration(), error)
+                                           joint%system%n_vibration(), error)
          if (allocated(error)) return
          if (restart%n_rows > 0) then
-            call resume(restart, recorder, self%system, self%march, self%state, error)
+            call resume(restart, recorder, joint%system, joint%march, joint%state, error)
          end if
          if (allocated(error)) return
-         call self%march%run(self%system, self%state, recorder, error, resumed=restart%n_rows > 0)
+         call joint%march%run(joint%system, joint%state, recorder, error, &
+                              resumed=restart%n_rows > 0)
+         if (allocated(error) .or. .not. joint%march%gave_up) return
+         ! The failure is one at these depths.
+         joint%balance%depth = joint%state%x(joint%system%n_vibration() + 1:)
+         call explain_failure(joint%balance, joint%solver%method, reason)
+         joint%march%ending = joint%march%ending//': '//reason
       end associate
-      if (allocated(error) .or. .not. self%march%gave_up) return
-      ! The failure is one at these depths.
-      self%balance%depth = self%state%x(self%system%n_vibration() + 1:)
-      call explain_failure(self%balance, self%solver%method, reason)
-      self%march%ending = self%march%ending//': '//reason
    end subroutine march_on
 
    !> The result of a joint whose vibration was not found.
@@ -214,9 +175,9 @@ contains
       class(wear_analysis), intent(inout) :: self
       character(:), allocatable :: reason
 
-      call explain_failure(self%balance, self%solver%method, reason)
-      self%march%options = self%recorder%case%wear
-      self%march%ending = 'nothing was worn: '//reason
+      call explain_failure(self%joint%balance, self%joint%solver%method, reason)
+      self%joint%march%options = self%recorder%case%wear
+      self%joint%march%ending = 'nothing was worn: '//reason
    end subroutine give_up_unworn
 
    !> How the run ended: to the observer, the summary and the result.
@@ -227,14 +188,15 @@ contains
       type(wear_outcome) :: outcome
       character(40) :: text
 
-      associate (march => self%march, recorder => self%recorder, &
+      associate (joint => self%joint, march => self%joint%march, &
+                 recorder => self%recorder, &
                  summary => self%recorder%run%summary)
          call recorder%run%observer%on_message('wear: '//march%ending)
-         call summary%describe_work(self%balance, march%stepper%newton%linear, &
+         call summary%describe_work(joint%balance, march%stepper%newton%linear, &
                                     recorder%case%solver%kind, &
                                     recorder%run%state%all_converged())
-         write (text, '(es13.6, a, es13.6)') depth_of(self%system, self%state), ' after ', &
-            self%state%cycles
+         write (text, '(es13.6, a, es13.6)') depth_of(joint%system, joint%state), ' after ', &
+            joint%state%cycles
          call summary%line('steady state', trim(steady_words(march%steady)))
          call summary%line('largest depth', trim(adjustl(text))//' cycles')
          call summary%line('wear steps', to_text(march%n_steps)//', '// &
@@ -246,11 +208,11 @@ contains
          if (restart%n_rows > 0) call summary%line('continued', 'after '// &
                                                    to_text(restart%n_rows)//' rows of '// &
                                                    restart%path)
-         if (.not. march%gave_up .and. allocated(self%state%x)) then
-            call recorder%finer%look_at_end(recorder%case, march, self%system, self%state)
+         if (.not. march%gave_up .and. allocated(joint%state%x)) then
+            call recorder%finer%look_at_end(recorder%case, march, joint%system, joint%state)
          end if
          call recorder%finer%remark(recorder%case, summary)
-         call remark_steps(recorder%case, march, depth_of(self%system, self%state), summary)
+         call remark_steps(recorder%case, march, depth_of(joint%system, joint%state), summary)
          call recorder%finer%finish()
          outcome%steady_state = trim(steady_words(march%steady))
          outcome%ending = march%ending
@@ -431,13 +393,6 @@ contains
       call self%recorder%find(system, x, found, iterations, error)
    end subroutine find_by_recorder
 
-   !> Whether nothing in the case tells the size of the steps.
-   pure logical function needs_depth_step(case)
-      type(case_type), intent(in) :: case
-
-      needs_depth_step = is_linear_euler(case) .and. case%wear%max_depth_step <= 0.0_wp
-   end function needs_depth_step
-
    pure function cycles_units(case) result(units)
       type(case_type), intent(in) :: case
       character(6 + 15*count([case%wear%scheme == wear_pseudo_time])) :: units
@@ -454,30 +409,5 @@ contains
       depth = 0.0_wp
       if (allocated(state%x)) depth = maxval(state%x(system%n_vibration() + 1:))
    end function depth_of
-
-   !> The unworn joint.
-   subroutine first_state(system, x, point, state)
-      type(wear_system), intent(inout) :: system
-      real(wp), intent(in) :: x(:)
-      type(point_type), intent(in) :: point
-      type(wear_state), intent(out) :: state
-
-      ! Vibration, then depths: the unknowns of the coupled system.
-      state%x = [x, system%vibration%depth]
-      call stand_at(system, state%x)
-      state%rate = system%rate
-      state%residual = point%residual
-   end subroutine first_state
-
-   !> Contact forces and rates that the next step starts from.
-   subroutine stand_at(system, x)
-      type(wear_system), intent(inout) :: system
-      real(wp), intent(in), contiguous :: x(:)
-      real(wp), allocatable :: r(:)
-
-      allocate (r(system%n))
-      call system%begin_step(x(system%n_vibration() + 1:), 0.0_wp)
-      call system%residual(x, r)
-   end subroutine stand_at
 
 end module fw_wear_response

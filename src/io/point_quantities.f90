@@ -15,7 +15,8 @@ module fw_point_quantities
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
       follows_parameter, goes_over, has_endurance, has_levels, has_stress, has_tensor, &
-      is_accurate, is_controlled, is_mode, is_response, scales_load, shows_contact, wears
+      is_accurate, is_controlled, is_mission, is_mode, is_response, scales_load, shows_contact, &
+      wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -135,6 +136,9 @@ contains
                'modal amplitude sqrt(U^H M U) of the first harmonic', is_mode)
       call add('mode/first_harmonic', r, '<length>', 'point observed', &
                'amplitude of the first harmonic', is_mode)
+      call add('wear/flight', i, '1', 'step', 'flight, the last one of a jump; 0 before', &
+               is_mission)
+      call add('wear/block', i, '1', 'step', 'block of the flight; 0 before', is_mission)
       call add('wear/cycles', r, '1', 'step', 'cycles of vibration', wears)
       call add('wear/depth', r, '<length>', 'step pair', 'wear depth', wears)
       call add('wear/rate', r, '<length>', 'step pair', 'wear depth per cycle', wears)
@@ -395,6 +399,10 @@ contains
          if (allocated(point%first_harmonic)) values = [point%modal_amplitude]
       case ('mode/first_harmonic')
          if (allocated(point%first_harmonic)) values = point%first_harmonic
+      case ('wear/flight')
+         if (allocated(point%depth)) values = [real(point%flight, wp)]
+      case ('wear/block')
+         if (allocated(point%depth)) values = [real(point%block, wp)]
       case ('wear/cycles')
          if (allocated(point%depth)) values = [point%cycles]
       case ('wear/depth')

@@ -8,8 +8,8 @@ module fw_quantity_conditions
    private
 
    public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
-             goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
-             has_endurance, has_stress, has_tensor, scales_load, shows_contact, wears
+             goes_over, has_endurance, has_levels, has_stress, has_tensor, is_accurate, &
+             is_controlled, is_mission, is_mode, is_response, scales_load, shows_contact, wears
 
 contains
 
@@ -118,6 +118,13 @@ contains
 
       shows_contact = case%output%contact .and. case%contact%n_pairs > 0
    end function shows_contact
+
+   !> Wear over blocks.
+   pure logical function is_mission(case)
+      type(case_type), intent(in) :: case
+
+      is_mission = wears(case) .and. case%mission%is_wanted()
+   end function is_mission
 
    pure logical function wears(case)
       type(case_type), intent(in) :: case

@@ -17,6 +17,7 @@ module fw_read_case
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
    use fw_read_cyclic, only: check_sectors, read_cyclic
+   use fw_read_mission, only: read_mission
    use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_mode, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
@@ -51,6 +52,8 @@ module fw_read_case
       character(:), allocatable :: origin
       !> Try model files in a process of their own first: for programs of one thread.
       logical :: tries_files = .false.
+      !> A block of a mission, which is read from the source that the case has kept.
+      logical :: is_block = .false.
    end type case_input
 
    !> Harmonics of a nonlinear mode, a resonance or a controlled response where nothing is said of
@@ -131,10 +134,29 @@ contains
       call reader%finish(error)
       if (allocated(error)) return
       case%namelist = reader%effective()
+      if (case%mission%is_wanted() .and. .not. input%is_block) then
+         call keep_source(input, case, memory_model)
+      end if
       call check_combinations(case, error)
       if (.not. allocated(error)) call check_resonance(case, error)
       if (.not. allocated(error)) call check_sensitivity(case, error)
    end subroutine read_groups
+
+   !> What the blocks of a mission are read from.
+   subroutine keep_source(input, case, memory_model)
+      type(case_input), intent(in) :: input
+      type(case_type), intent(inout) :: case
+      type(raw_model), intent(in), optional :: memory_model
+
+      allocate (case%mission%source)
+      associate (source => case%mission%source)
+         source%path = input%path
+         if (allocated(input%text)) source%text = input%text
+         source%overrides = input%overrides
+         source%tries_files = input%tries_files
+         if (present(memory_model)) source%model = memory_model
+      end associate
+   end subroutine keep_source
 
    !> Values with units become numbers, if there are any.
    subroutine read_units(reader, path, error, memory_model)
@@ -271,6 +293,7 @@ contains
       call case%solver%bind_keys(reader)
       call case%pseudo_time%bind_keys(reader)
       call case%wear%bind_keys(reader, analyses(case%analysis)%wears)
+      call read_mission(reader, directory_of(path), case%mission, case%inputs)
       call case%time%bind_keys(reader)
       call read_mode(reader, case%analysis, case%mode)
       call read_stress(reader, case%stress)

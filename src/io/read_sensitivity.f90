@@ -114,7 +114,8 @@ contains
          if (is_cyclic_mode(case)) options%quantities = [first_harmonic]
          if (case%contact%n_pairs == 0) return
          options%quantities = [options%quantities, dissipation]
-         if (case%wear%coefficient > 0.0_wp) options%quantities = [options%quantities, wear_volume]
+         if (.not. allocated(case%wear%coefficient)) return
+         options%quantities = [options%quantities, wear_volume]
       end associate
    end subroutine finish_sensitivity
 
@@ -190,7 +191,7 @@ contains
             else if (quantity == largest .and. is_cyclic_mode(case)) then
                call fatal_error(error, "sensitivity%quantities = 'largest' is not served for "// &
                                 'nonlinear modes of cyclic structures: leave it out', status_input)
-            else if (quantity == wear_volume .and. .not. case%wear%coefficient > 0.0_wp) then
+            else if (quantity == wear_volume .and. .not. allocated(case%wear%coefficient)) then
                call fatal_error(error, "sensitivity%quantities = 'wear_volume' needs "// &
                                 'wear%coefficient: give it, or leave the quantity out', &
                                 status_input)

@@ -32,7 +32,7 @@ module fw_restart_file
    !> compared by itself.
    character(*), parameter :: free_keys(*) = [character(18) :: 'case%title', 'case%threads', &
       'case%max_seconds', 'model%file', 'contact%worn', 'contact%worn_step', 'wear%n_cycles', &
-      'wear%max_steps', 'wear%check_steps', 'output%file']
+      'wear%max_steps', 'wear%check_steps', 'mission%n_flights', 'output%file']
 
    !> The datasets of a step besides those of every point.
    character(*), parameter :: own_names(*) = [character(21) :: '/restart/vibration', &
@@ -56,6 +56,11 @@ module fw_restart_file
       real(wp), allocatable :: energy(:)
       !> Unknowns and rates of the first state.
       type(wear_state) :: first
+      !> Of a mission every row up to there: flight and block, unknowns of the vibration, depth and
+      !> rate (n_pairs, n_rows), residual, control and counts.
+      integer, allocatable :: flight(:), block(:)
+      real(wp), allocatable :: vibrations(:, :), depths(:, :), rates(:, :), residuals(:), &
+                               controls(:, :), mission(:, :)
    contains
       procedure :: check_first
       procedure :: give_control
@@ -128,8 +133,8 @@ contains
       if (allocated(error)) return
       if (len(there) > 0) then
          call fatal_error(error, file%path//': its run had '//there//', this case has '//here// &
-                          ': only wear%n_cycles, wear%max_steps and the name of the result may '// &
-                          'change; take the value back, or start anew', status_input)
+                          ': only wear%n_cycles, mission%n_flights, wear%max_steps and the '// &
+                          'name of the result may change; take the value back, or start anew', status_input)
          return
       end if
       call read_dataset(file, '/restart/pairs', constants, error)
@@ -166,6 +171,7 @@ contains
       do i = 1, size(own_names)
          call append(names, trim(own_names(i)))
       end do
+      call append(names, '/restart/mission')
       do i = 1, size(names)
          ! An earlier version may have known fewer quantities.
          if (.not. file%exists(names(i)%text)) cycle
@@ -230,6 +236,15 @@ contains
          return
       end if
       call read_points(file, omega, residual, control(c_converged, :), self%points, error)
+      if (allocated(error) .or. .not. file%exists('/restart/mission')) return
+      call read_dataset(file, '/wear/flight', self%flight, error)
+      if (.not. allocated(error)) call read_dataset(file, '/wear/block', self%block, error)
+      if (.not. allocated(error)) call read_dataset(file, '/restart/mission', self%mission, error)
+      self%vibrations = vibration(:, :n)
+      self%depths = depth(:, :n)
+      self%rates = rate(:, :n)
+      self%residuals = residual(:n)
+      self%controls = control(:, :n)
    end subroutine read_rows
 
    !> What the summary and the observers want of earlier steps.

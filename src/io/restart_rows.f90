@@ -4,6 +4,7 @@
 !> /restart/vibration     unknowns of the vibration (n_steps, n_unknowns)
 !> /restart/checked_rate  rates at which gross slip was last looked for (n_steps, n_pairs)
 !> /restart/control       the control of the steps (n_steps, see the attribute `columns`)
+!> /restart/mission       of a mission what it has counted (n_steps, 4)
 !> /restart/pairs         constants of the pairs (see the attribute `columns`; n_pairs)
 !>
 !> Nothing is written where there is no file. HDF5 serves one thread at a time: every procedure
@@ -19,7 +20,7 @@ module fw_restart_rows
    private
 
    public :: restart_row_set, pair_constants
-   public :: pair_keys, n_controls, n_notes
+   public :: pair_keys, n_controls, n_counts, n_notes
    public :: c_next_cycles, c_largest_rate, c_checked_depth, c_spacing, c_steps, c_rejected, &
              c_converged, c_unsettled, c_reach, c_touch, c_provisional, c_implicit, c_leaps, &
              c_jumps, c_first_jump, c_noted
@@ -42,8 +43,10 @@ module fw_restart_rows
       'normal_load', 'tangential_stiffness', 'normal_stiffness', 'worn']
 
    !> Places of the datasets in `list`.
-   integer, parameter :: d_vibration = 1, d_checked_rate = 2, d_control = 3
-   integer, parameter :: n_datasets = 3
+   integer, parameter :: d_vibration = 1, d_checked_rate = 2, d_control = 3, d_mission = 4
+   integer, parameter :: n_datasets = 4
+   !> Of a mission: error of its jumps, jumps taken and refused, marches of a block.
+   integer, parameter :: n_counts = 4
 
    type :: restart_row_set
       type(growing_dataset), private :: list(n_datasets)
@@ -57,17 +60,21 @@ module fw_restart_rows
 contains
 
    !> Datasets of `create`, alone with the library: HDF5 is not called from two threads at once.
-   subroutine create_datasets(self, file, contact, n_unknowns, error)
+   subroutine create_datasets(self, file, contact, n_unknowns, error, of_mission)
       class(restart_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       type(contact_type), intent(in) :: contact
       !> Unknowns of the vibration.
       integer, intent(in) :: n_unknowns
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: of_mission
 
       if (file%id < 0) return
       !$omp critical (fretwear_io)
       call create(self, file, contact, n_unknowns, error)
+      if (present(of_mission) .and. .not. allocated(error)) then
+         call self%list(d_mission)%create(file, '/restart/mission', growing_real, [n_counts], error)
+      end if
       !$omp end critical (fretwear_io)
    end subroutine create_datasets
 
@@ -112,7 +119,7 @@ contains
    end function pair_constants
 
    !> The march when its observer sees a state, and the vibration of that state.
-   subroutine append_row(self, file, march, vibration, converged, notes, error)
+   subroutine append_row(self, file, march, vibration, converged, notes, error, counts)
       class(restart_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       type(wear_march), intent(in) :: march
@@ -122,6 +129,8 @@ contains
       !> What the observer has noted so far.
       real(wp), intent(in) :: notes(n_notes)
       type(error_type), allocatable, intent(out) :: error
+      !> Of a mission.
+      real(wp), intent(in), optional :: counts(n_counts)
       real(wp) :: control(n_controls)
 
       if (.not. self%list(d_vibration)%is_created()) return
@@ -144,6 +153,9 @@ contains
       !$omp critical (fretwear_io)
       call self%list(d_vibration)%append(file, vibration, error)
       if (.not. allocated(error)) call self%list(d_control)%append(file, control, error)
+      if (present(counts) .and. .not. allocated(error)) then
+         call self%list(d_mission)%append(file, counts, error)
+      end if
       if (.not. allocated(error)) then
          if (allocated(march%checked_rate)) then
             call self%list(d_checked_rate)%append(file, march%checked_rate, error)
@@ -165,6 +177,7 @@ contains
 
       !$omp critical (fretwear_io)
       do i = 1, n_datasets
+         if (.not. self%list(i)%is_created()) cycle
          call self%list(i)%copy_rows(file, source, n, error)
          if (allocated(error)) exit
       end do

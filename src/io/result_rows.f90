@@ -99,7 +99,9 @@ contains
       type(case_type), intent(in) :: case
 
       expected_rows = 1
-      if (analyses(case%analysis)%wears) then
+      if (case%mission%is_wanted()) then
+         expected_rows = 1 + min(usual_rows, case%mission%n_flights)*case%mission%n_blocks
+      else if (analyses(case%analysis)%wears) then
          ! The state before any wear is a row of its own.
          expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
       else if (analyses(case%analysis)%is_free) then

@@ -23,8 +23,8 @@ module fw_wear_options
       integer :: scheme = wear_implicit
       !> Depth proportional to pressure times slip (Archard), or to friction energy.
       integer :: law = wear_archard
-      !> Wear coefficient k_w [area / force]; required, no default.
-      real(wp) :: coefficient = -1.0_wp
+      !> Wear coefficient k_w of every pair (n_pairs) [area / force]; required, no default.
+      real(wp), allocatable :: coefficient(:)
       !> Order of the scheme in the cycles (0: 1 with steps of a given size, else the highest that
       !> pays).
       integer :: order = 0
@@ -78,8 +78,8 @@ contains
                          '0: chosen', from_to(0, 4), only="scheme = 'implicit', 'explicit'"), &
                      self%order)
       call keys%bind(key('coefficient', 'k_w: depth is k_w times contact force times slip over '// &
-                         'area', above(0.0_wp), unit='L^2/F', absent='required for wear'), &
-                     self%coefficient, needed=is_wear)
+                         'area', above(0.0_wp), 'L^2/F', 'n_pairs', &
+                         absent='required for wear'), self%coefficient, needed=is_wear)
       call keys%bind(key('n_cycles', 'cycles to be covered', above(0.0_wp) .and. &
                          at_most(most_cycles), absent='none'), self%n_cycles)
       call keys%bind(key('max_depth_step', 'largest growth of the depth in a step; 0: by the '// &

@@ -81,6 +81,8 @@ module fw_wear_march
       !> Steps taken, and tried in vain.
       integer :: n_steps = 0
       integer :: n_rejected = 0
+      !> A part of something longer: only cycles and a joint that does not wear at all end it.
+      logical :: is_part = .false.
       !> All that was asked for has been covered: a steady state, the cycles, or gross slip.
       logical :: complete = .false.
       !> No step was short enough to converge.
@@ -109,6 +111,7 @@ module fw_wear_march
       type(bdf_integrator), private :: bdf
    contains
       procedure :: run
+      procedure :: begin_anew
    end type wear_march
 
    abstract interface
@@ -143,6 +146,31 @@ contains
                  unused_state => state)
       end associate
    end subroutine begin_slip
+
+   !> Forget an earlier march, but for the options, the stepper and what is known of the resonance.
+   subroutine begin_anew(self)
+      class(wear_march), intent(inout) :: self
+
+      self%steady = steady_not_reached
+      self%n_steps = 0
+      self%n_rejected = 0
+      self%complete = .false.
+      self%gave_up = .false.
+      if (allocated(self%ending)) deallocate (self%ending)
+      self%next_cycles = 0.0_wp
+      self%touch = touch_guard()
+      self%largest_rate = 0.0_wp
+      self%checked_depth = 0.0_wp
+      if (allocated(self%checked_rate)) deallocate (self%checked_rate)
+      self%n_unsettled = 0
+      self%n_implicit = 0
+      self%n_leaps = 0
+      self%n_jumps = 0
+      self%first_jump = 0.0_wp
+      self%is_provisional = .false.
+      ! Whoever continues a run from here has no preconditioners from before.
+      self%stepper%newton%linear%worth_keeping = .false.
+   end subroutine begin_anew
 
    !> March from a settled state (residual, rates known); the last state is left in it.
    subroutine run(self, system, state, observer, error, resumed)
@@ -212,7 +240,8 @@ contains
 
       rate = maxval(state%rate)
       self%largest_rate = max(self%largest_rate, rate)
-      if (rate <= self%options%steady_tolerance*self%largest_rate) then
+      if (rate <= self%options%steady_tolerance*self%largest_rate .and. &
+          .not. (self%is_part .and. rate > 0.0_wp)) then
          self%steady = steady_reached
          self%complete = .true.
          if (self%n_steps == 0) then
@@ -223,7 +252,7 @@ contains
          else
             self%ending = 'steady state after '//to_text(self%n_steps)//' steps'
          end if
-      else if (in_gross_slip(self, system, state)) then
+      else if (.not. self%is_part .and. in_gross_slip(self, system, state)) then
          self%steady = steady_gross_slip
          self%complete = .true.
          self%ending = 'the whole joint keeps sliding and wears at a constant rate: there is '// &

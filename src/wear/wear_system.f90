@@ -103,8 +103,8 @@ contains
    subroutine new_wear_system(balance, contact, coefficient, by_energy, self)
       type(balance_state), intent(inout), target :: balance
       type(contact_type), intent(in) :: contact
-      !> Wear coefficient k_w [area/force].
-      real(wp), intent(in) :: coefficient
+      !> Wear coefficient k_w of every pair (n_pairs) [area/force].
+      real(wp), intent(in) :: coefficient(:)
       !> The coefficient multiplies friction energy (mu p ds) instead of p ds.
       logical, intent(in) :: by_energy
       type(wear_system), intent(out) :: self

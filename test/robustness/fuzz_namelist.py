@@ -29,6 +29,7 @@ KEYS = {
     "pseudo_time": ["flow", "scheme", "step", "cfl", "max_steps"],
     "wear": ["scheme", "law", "order", "coefficient", "n_cycles", "max_depth_step",
              "error_tolerance", "steady_tolerance", "max_steps", "check_steps", "follow_resonance"],
+    "mission": ["n_blocks", "cycles", "n_flights", "change", "name", "flights_per_jump"],
     "time": ["n_periods", "steps_per_period"],
     "resonance": ["parameter", "start", "end", "n_points", "spacing", "as", "condition", "quantity",
                   "continuation", "max_points"],

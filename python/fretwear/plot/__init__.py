@@ -15,6 +15,7 @@ from .disks import plot_nodal_diameters, plot_safe, plot_wave
 from .flanks import plot_flanks
 from .found import plot_calibration, plot_optimum
 from .kinds import KINDS, Choices, Kind, fitting
+from .mission import plot_mission
 from .mode import plot_mode
 from .resonance import plot_resonance
 from .response import (
@@ -33,7 +34,7 @@ __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "
            "half_power_damping", "main", "plot_backbone", "plot_calibration", "plot_campbell",
            "plot_convergence", "plot_cycle", "plot_damping", "plot_envelope",
            "plot_flanks", "plot_force", "plot_harmonics",
-           "plot_hysteresis", "plot_mode", "plot_nodal_diameters", "plot_optimum",
+           "plot_hysteresis", "plot_mission", "plot_mode", "plot_nodal_diameters", "plot_optimum",
            "plot_resonance", "plot_response", "plot_responses", "plot_safe", "plot_sensitivity",
            "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",
            "read_damping", "read_response"]

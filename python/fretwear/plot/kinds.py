@@ -14,6 +14,7 @@ from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
+from .mission import plot_mission
 from .mode import plot_mode
 from .resonance import plot_resonance
 from .response import plot_response
@@ -111,6 +112,8 @@ KINDS: dict[str, Kind] = {
                       lambda r, c: plot_wear_bars(r, c.point)),
     "wear_evolution": Kind("Wear over the cycles", _has("wear/depth", "wear/cycles"),
                            lambda r, c: plot_wear_evolution(r)),
+    "mission": Kind("Wear over the flights of a mission", _has("mission/depth"),
+                    lambda r, c: plot_mission(r)),
     "wave": Kind("Wave over the sectors", lambda r: (
         "coefficients" in r and r.n_points > 0 and "engine_order" in r.attributes
         and bool(r.converged.any())), lambda r, c: plot_wave(r, c.point, c.observe)),
