@@ -266,6 +266,25 @@ class Spring(TypedDict, total=False):
     power: ArrayLike
 
 
+class Polynomial(TypedDict, total=False):
+    """Group &polynomial: forces that are polynomials of several dofs."""
+
+    #: required with factors; 0 switches the terms of a file off (default: of the file, else 0)
+    n_terms: int
+    #: what the terms are: a potential, whose gradient the forces are, or a force on one dof each
+    #: (default: of the file, else 'energy')
+    of: Literal["energy", "force"]
+    #: signed dofs that a term is the product of, repeated for powers; 0: none (default: of the
+    #: file, else required)
+    factors: ArrayLike
+    #: of the terms; force = coefficient * product of the factors, or that is a potential (default:
+    #: of the file, else required)
+    coefficient: ArrayLike
+    #: dof that the force of a term acts on, on the side of the stiffness; only: of = 'force'
+    #: (default: of the file, else required)
+    dof: ArrayLike
+
+
 class Load(TypedDict, total=False):
     """Group &load: static and harmonic loads."""
 
@@ -535,6 +554,7 @@ class Groups(TypedDict, total=False):
     cyclic: Cyclic
     contact: Contact
     spring: Spring
+    polynomial: Polynomial
     load: Load
     harmonics: Harmonics
     sweep: Sweep

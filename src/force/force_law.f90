@@ -45,6 +45,9 @@ module fw_force_law
       !> (n_elements): those of the law are then the highest order, and whether any element does.
       !> Who deals with one element asks `order_of`, `in_time` and `takes`.
       type(input_facts), allocatable :: own(:)
+      !> Forces depend on the frequency while their inputs are held, as a law makes rates of
+      !> displacements by itself: `by_frequency` has the derivative.
+      logical :: has_frequency = .false.
       !> Makes the input of the displacement or its derivative (n_elements, 3 or 1): [force/length]
       !> where y is a force.
       real(wp), allocatable :: stiffness(:, :)
@@ -200,7 +203,10 @@ module fw_force_law
       procedure :: fractions
       procedure :: slope_at_rest
       procedure :: slope_at
+      procedure :: slopes_about
       procedure :: n_parameters
+      procedure :: find_parameter
+      procedure :: by_frequency
       procedure :: by_parameter
       procedure :: instants_wanted
    end type force_law
@@ -264,7 +270,9 @@ contains
       class(prediction_type), intent(in) :: self
       integer, intent(in) :: element, component
 
-      order = self%order(component)
+      order = 0
+      ! Elements of more components take displacements.
+      if (component <= size(self%order)) order = self%order(component)
       if (allocated(self%own)) order = self%own(element)%order(component)
    end function order_of
 
@@ -491,6 +499,46 @@ contains
       associate (unused => self, unused_element => element, unused_input => y)
       end associate
    end function slope_at
+
+   !> Slopes of the forces of an element about a position at rest y (component): (output, input).
+   subroutine slopes_about(self, element, y, slope)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(out) :: slope(:, :)
+      integer :: c
+
+      slope = 0.0_wp
+      do c = 1, size(y)
+         slope(c, c) = self%slope_at(element, y(c))
+      end do
+   end subroutine slopes_about
+
+   !> Derivative of the forces by the frequency where the inputs are held, at the last evaluation, in
+   !> `work%output`: of most laws there is none, and the
+   !> prediction says so.
+   subroutine by_frequency(self, fourier, work)
+      class(force_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      work%output = 0.0_wp
+      associate (unused => self, unused_fourier => fourier)
+      end associate
+   end subroutine by_frequency
+
+   !> Which element, and which of its constants, the value of a parameter is (see by_parameter).
+   pure subroutine find_parameter(self, value, element, number)
+      class(force_law), intent(in) :: self
+      !> Its place among those of the input.
+      integer, intent(in) :: value
+      integer, intent(out) :: element, number
+
+      element = value
+      number = 1
+      associate (unused => self)
+      end associate
+   end subroutine find_parameter
 
    !> Constants of each element by which `by_parameter` differentiates.
    pure integer function n_parameters(self)

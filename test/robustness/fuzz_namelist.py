@@ -16,6 +16,7 @@ KEYS = {
                 "mu_dynamic", "weakening_speed", "weakening_exponent", "mu_viscous", "speed_1",
                 "speed_2", "iwan_chi", "iwan_beta", "bouc_wen_exponent", "bouc_wen_beta",
                 "penalty_scale", "memory", "worn", "worn_step"],
+    "polynomial": ["n_terms", "of", "factors", "coefficient", "dof"],
     "spring": ["n_springs", "side_1", "side_2", "sector_2", "coefficient", "power"],
     "load": ["static", "cosine", "sine", "n_terms", "term_dof", "term_harmonic", "term_order",
              "term_amplitude", "term_phase", "term_power", "static_scale", "harmonic_scale"],
