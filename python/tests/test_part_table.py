@@ -24,7 +24,8 @@ PAIRS = fw.ContactPairs(
     [[1, 2, 3]], [[4, 5, 6]], mu=0.3, gap=0.0, area=1.0, normal_load=0.0, position=[[0, 0, 0]],
     tangential_stiffness=1.0, normal_stiffness=1.0, slip_speed=1.0, patch=["a"], sector_2=[0],
     mu_dynamic=0.2, weakening_speed=1.0, weakening_exponent=1.0, mu_viscous=0.0, speed_1=0.0,
-    speed_2=0.0,
+    speed_2=0.0, normal_coefficient=1.0, normal_exponent=1.5, reference_force=1.0,
+    decay_length=1.0, table=[[0.0, 0.0], [1.0, 2.0]], normal_law="power",
     law="penalty")
 EYE = np.eye(6)
 
@@ -48,7 +49,8 @@ def nodal() -> fw.Model:
 
 MODELS = {
     "plain": whole,
-    "laws": lambda: whole(contact=replace(PAIRS, law=["penalty"])),
+    "laws": lambda: whole(contact=replace(PAIRS, law=["penalty"],
+                                            normal_law=["power"])),
     "sector": lambda: whole(sectors=fw.Sectors(3, [1], [-4], air=fw.Air({0: np.eye(2)},
                                                                         modes=EYE[:2]))),
     "nodal": nodal}

@@ -120,11 +120,15 @@ contains
    real(wp) function slope_of(system, law, element, component) result(slope)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: law, element, component
-      real(wp) :: elongation
+      real(wp) :: elongation, force
 
       associate (entry => system%problem%forces%entry(law), work => system%work(law))
          if (law == system%problem%forces%pairs) then
             slope = entry%law%slope_at_rest(element, component)
+            if (component == 3 .and. entry%law%facts%is_curved) then
+               call entry%law%press_at(element, work%prediction(element, 3, 1) + &
+                                       work%offset(element), force, slope)
+            end if
          else
             elongation = 0.0_wp
             ! Harmonic 0 is the first of those retained.

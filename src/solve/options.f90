@@ -203,7 +203,7 @@ contains
       call keys%bind(key('max_points', 'points of a branch at most', at_least(1), &
                          only="continuation = 'arclength'"), self%max_points)
       call keys%bind(key('stability', 'compute the Floquet multipliers of every point', &
-                         only="springs and law = 'penalty'"), self%stability)
+                         only="springs, law = 'penalty', 'regularised'"), self%stability)
       call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
                          only="analysis = 'frf', continuation = 'natural'"), self%refine)
       call keys%bind(key('first_point', 'the first of its points that is a row: a piece of a '// &

@@ -179,10 +179,10 @@ def add_part(toy):
 def add_parameter(toy):
     """'contact%slip_speed': a constant of a law that sweeps go over."""
     toy.change("src/model/parameters.f90",
-               ("      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative)]",
-                "      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative), &\n"
+               (")]\n\n   integer, parameter :: n_parameter_words",
+                "), &\n"
                 "      parameter_type('contact%slip_speed', of_pairs, positive, of_sliding, &\n"
-                "                     .false.)]"))
+                "                     .false.)]\n\n   integer, parameter :: n_parameter_words"))
 
 
 TOYS = {"law": add_law, "quantity": add_quantity, "rule": add_rule, "analysis": add_analysis,
