@@ -46,6 +46,7 @@ from .analyses import frf, mode, resonance, run, wear
 from .bifurcation import Bifurcation
 from .case import Case
 from .design import calibrate, optimise
+from .elements import Polynomial
 from .errors import (
     AbsentError,
     ConvergenceError,
@@ -62,8 +63,8 @@ from .steps import Point, Steps
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
-           "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring", "Steps", "__version__",
-           "calibrate", "frf", "mode", "optimise", "resonance", "run", "wear"]
+           "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring", "Steps",
+           "__version__", "calibrate", "frf", "mode", "optimise", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._arguments import array, dofs, text, whole
 from ._namelist import literal
 from ._native import Session, unread_parts
+from .elements import Elements, checked_elements, read_elements
 from .errors import InputError, NotBuiltError, OutputError
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
@@ -170,6 +171,8 @@ class Model:
         Pairs in contact.
     springs : iterable of Spring, optional
         Nonlinear springs.
+    elements : iterable of Elements, optional
+        Other elements, such as a `Polynomial`: one of each kind.
     static, cosine, sine : (n_dof,), optional
         Loads [force].
     stiffness_rotation : (n_dof, n_dof), optional
@@ -200,7 +203,7 @@ class Model:
 
     def __init__(self, M: ArrayLike | None, C: ArrayLike | None, K: ArrayLike | None, *,
                  contact: ContactPairs | None = None, springs: Iterable[Spring] = (),
-                 static: ArrayLike | None = None, cosine: ArrayLike | None = None,
+                 elements: Iterable[Elements] = (), static: ArrayLike | None = None, cosine: ArrayLike | None = None,
                  sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
                  static_rotation: ArrayLike | None = None, sectors: Sectors | None = None,
                  observe: Mapping[str, Observation] | None = None,
@@ -232,6 +235,7 @@ class Model:
                                  "Spring")
             dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
             array(f"springs[{number}].coefficient", spring.coefficient, ())
+        self.elements = checked_elements(elements, n)
         self.sectors = None if sectors is None else sectors.checked(n)
         self._observe = None if observe is None else _rows(observe, n)
         if observe is not None and self._diameter_names() is not None:
@@ -366,7 +370,7 @@ class Model:
                 return cls(
                     found.get("mass"), found.get("damping"), found.get("stiffness"),
                     contact=_contact_of(found, file), observe=_observed_of(file), **loads,
-                    springs=_springs_of(file),
+                    springs=_springs_of(file), elements=read_elements(file),
                     sectors=read_sectors(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
                     coriolis=found.get("coriolis"),
@@ -404,6 +408,8 @@ class Model:
                     pairs[f"contact/{name}"] = strings(words)
             if (table := getattr(self.contact, "table", None)) is not None:
                 pairs["contact/table"] = table
+            groups.update((one.group, dict(words)) for one in self.elements
+                          if (words := one.attributes()))
             write_model_file(path, {**self._datasets(), **pairs, **self._spring_datasets()},
                              title=self.title, unit_system=self.unit_system, groups=groups)
         except OSError as error:
@@ -434,6 +440,8 @@ class Model:
                 value = getattr(self.contact, name.split("/")[1])
                 if value is not None:
                     found[name] = strings(value) if name == "contact/patch" else value
+        for one in self.elements:
+            found.update(one.datasets())
         if self.sectors is not None:
             found.update(self.sectors.datasets())
         if self._observe is not None:
@@ -456,6 +464,9 @@ class Model:
         for name, values in self._datasets().items():
             if not name.startswith("observe/") and values.dtype.kind in "if":
                 session.put(name, values)
+        for one in self.elements:
+            for name, word in one.attributes().items():
+                session.put_texts(f"{one.group}/{name}", [word])
         for name in ("title", "unit_system"):
             if getattr(self, name):
                 session.put_texts(name, [getattr(self, name)])

@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from .elements import KINDS
 from .errors import AbsentError
 from .result_file import ResultFile
 
@@ -155,4 +156,5 @@ def read_sensitivities(result: ResultFile) -> Sensitivities:
 def _key(name: str) -> str:
     """contact%mu of contact_mu; quantities keep their names."""
     group, _, key = name.partition("_")
-    return f"{group}%{key}" if group in ("load", "contact", "spring", "model") else name
+    known = ("load", "contact", "spring", "model", *KINDS)
+    return f"{group}%{key}" if group in known else name

@@ -13,8 +13,8 @@ from typing import Literal, TypedDict
 from numpy.typing import ArrayLike
 
 __all__ = ["UNITS", "CaseGroup", "Contact", "Control", "Cyclic", "Groups", "Harmonics", "Load",
-           "Mode", "Output", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring",
-           "Structure", "Sweep", "Time", "Wear"]
+           "Mode", "Output", "Polynomial", "PseudoTime", "Resonance", "Sensitivity", "Solver",
+           "Spring", "Structure", "Sweep", "Time", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -284,6 +284,25 @@ class Spring(TypedDict, total=False):
     power: ArrayLike
 
 
+class Polynomial(TypedDict, total=False):
+    """Group &polynomial: forces that are polynomials of several dofs."""
+
+    #: required with factors; 0 switches the terms of a file off (default: of the file, else 0)
+    n_terms: int
+    #: what the terms are: a potential, whose gradient the forces are, or a force on one dof each
+    #: (default: of the file, else 'energy')
+    of: Literal["energy", "force"]
+    #: signed dofs that a term is the product of, repeated for powers; 0: none (default: of the
+    #: file, else required)
+    factors: ArrayLike
+    #: of the terms; force = coefficient * product of the factors, or that is a potential (default:
+    #: of the file, else required)
+    coefficient: ArrayLike
+    #: dof that the force of a term acts on, on the side of the stiffness; only: of = 'force'
+    #: (default: of the file, else required)
+    dof: ArrayLike
+
+
 class Load(TypedDict, total=False):
     """Group &load: static and harmonic loads."""
 
@@ -362,7 +381,7 @@ class Sweep(_Sweep, total=False):
                        "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
                        "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
                        "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
-                       "contact%normal_coefficient", "contact%reference_force"]
+                       "polynomial%coefficient"]
     #: a list of frequencies in any order, in place of start, end and n_points; only: analysis =
     #: 'frf', 'time', continuation = 'natural' (default: none)
     frequencies: ArrayLike
@@ -555,6 +574,7 @@ class Groups(TypedDict, total=False):
     cyclic: Cyclic
     contact: Contact
     spring: Spring
+    polynomial: Polynomial
     load: Load
     harmonics: Harmonics
     sweep: Sweep

@@ -34,6 +34,7 @@ def whole(**more: Any) -> fw.Model:
     """A model with every part that one of its kind can have."""
     more = {"contact": PAIRS, **more}
     return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, springs=[fw.Spring(1, 2, 0.5)],
+                    elements=[fw.Polynomial([[1, -2, 2]], [0.1], of="force", dof=[3])],
                     static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
                     stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
                     observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
@@ -72,7 +73,7 @@ def names_in(path: Path) -> set[str]:
     with h5py.File(path) as file:
         file.visititems(lambda name, item: found.add(name) if isinstance(item, h5py.Dataset)
                         else None)
-        for group in ("", "contact", "cyclic"):
+        for group in ("", "contact", "cyclic", "polynomial"):
             if group in file or not group:
                 found |= {f"{group}@{name}" for name in file[group or "/"].attrs}
     found = {re.sub(r"^nodal_diameter/\d+", "nodal_diameter/K", name) for name in found}

@@ -480,8 +480,9 @@ contains
    pure logical function pins_last(entry)
       type(force_entry), intent(in) :: entry
 
-      pins_last = entry%law%prediction%takes_balance .and. &
-                  entry%law%prediction%order(size(entry%row, 1)) == 0 .and. &
+      pins_last = .false.
+      if (.not. entry%law%prediction%takes_balance) return
+      pins_last = entry%law%prediction%order(size(entry%row, 1)) == 0 .and. &
                   .not. entry%law%prediction%some_are_free()
    end function pins_last
 
@@ -557,11 +558,9 @@ contains
             call self%problem%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), &
                                                    vector, &
                                            inputs(:, c))
-            if (p%order(c) > 0) then
-               if (p%order_of(element, c) > 0) call take_rate(self%problem%fourier, rests, &
-                                                              self%rate_unit(p, element), &
-                                                              inputs(:, c))
-            end if
+            if (p%order_of(element, c) > 0) call take_rate(self%problem%fourier, rests, &
+                                                           self%rate_unit(p, element), &
+                                                           inputs(:, c))
             if (p%has_inertia) call turn_row(self%problem%fourier, self%frequency(), p, element, &
                                              c, .false., inputs(:, c))
             if (.not. takes) cycle

@@ -67,6 +67,11 @@ contains
                call add_outputs(self, entry, work, not_open(p, work, .false.), &
                                 self%problem%incidence%identity, m, dr)
             end if
+            if (in_time .and. entry%law%facts%has_frequency) then
+               call entry%law%by_frequency(self%problem%fourier, work)
+               call add_outputs(self, entry, work, not_open(p, work, .false.), &
+                                self%problem%incidence%identity, m, dr)
+            end if
             if (.not. p%takes_balance) cycle
             call inputs_by_point(self, entry, in_time, m, nc, q, dr, work%input)
             call multiply_derivative(entry%row, work)

@@ -15,7 +15,7 @@ submodule(fw_balance_state) fw_balance_waves
    !> Means of an element over the sectors: of G (output, input), and of G times the stiffness of
    !> the input and what its derivative makes of a coefficient.
    type :: mean_type
-      complex(wp) :: force(3, 3) = zero, slope(3, 3) = zero
+      complex(wp), allocatable :: force(:, :), slope(:, :)
    end type mean_type
 
    !> Of the elements of a law in a sector.
@@ -121,6 +121,10 @@ contains
 
       allocate (mean(size(entry%row, 2)/self%problem%structure%n_alike))
       if (size(mean) == 0) return
+      do i = 1, size(mean)
+         allocate (mean(i)%force(size(entry%row, 1), size(entry%row, 1)), source=zero)
+         allocate (mean(i)%slope(size(entry%row, 1), size(entry%row, 1)), source=zero)
+      end do
       do e = 1, size(entry%row, 2)
          i = modulo(e - 1, size(mean)) + 1
          if (work%linear_state(e) == pair_open) cycle
@@ -190,13 +194,12 @@ contains
       complex(wp), intent(in) :: stiffness(:, :)
       complex(wp), intent(inout) :: matrix(:, :)
       complex(wp), allocatable :: input(:), output(:)
-      integer :: c_in, c_out, i, j, n, n_sectors, row_of(3)
+      integer :: c_in, c_out, i, j, n, n_sectors, row_of(size(entry%row, 1))
 
       n_sectors = self%problem%structure%n_alike
       row_of = 0
       where (entry%row(:, element) > 0)
-         row_of(:size(entry%row, 1)) = self%problem%joint%row_in_sector(max(1, &
-                                                                            entry%row(:, element)))
+         row_of = self%problem%joint%row_in_sector(max(1, entry%row(:, element)))
       end where
       do c_out = 1, size(entry%row, 1)
          if (entry%row(c_out, element) == 0) cycle

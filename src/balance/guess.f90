@@ -13,7 +13,7 @@ module fw_guess
 
    public :: stuck_guess, free_guess, held_without_contact, held_without_friction
    ! For the submodule alone, which gfortran lets reach no private procedures.
-   public :: mean_slope, elastic_slope, solve_free, find_tension, gap_of, rest_type
+   public :: find_mean_slopes, elastic_slope, solve_free, find_tension, gap_of, rest_type
 
    !> Rounds of opening pairs under tension; each opens at least one pair or is the last. Those of
    !> them that also close pairs.
@@ -207,39 +207,52 @@ contains
       held = is_positive_definite(real(stiffness, wp))
    end function held_without_contact
 
-   !> Stiffness of a law of one component at rest, as of a linear spring, and what it gains on
+   !> Stiffness of the elements of a law at rest, as of linear springs, and what they gain on
    !> average over the motion: a spring that hardens holds, too, what has gone off far enough.
    subroutine add_law(system, k, stiffness)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: k
       !> Of harmonic 0 (n_coordinates, n_coordinates).
       complex(wp), intent(inout) :: stiffness(:, :)
-      integer :: i, row
+      real(wp) :: slope(system%problem%forces%entry(k)%law%n_components, &
+                        system%problem%forces%entry(k)%law%n_components)
+      integer :: c, d, i
 
-      associate (law => system%problem%forces%entry(k)%law)
-         if (law%n_components > 1 .or. law%prediction%order(1) > 0) return
+      associate (law => system%problem%forces%entry(k)%law, &
+                 row => system%problem%forces%entry(k)%row)
          do i = 1, law%n_elements
-            row = system%problem%forces%entry(k)%row(1, i)
-            if (row == 0) cycle
-            call system%problem%incidence%add_block( &
-               row, 1, cmplx(mean_slope(system, k, i)*law%prediction%stiffness(i, 1), kind=wp), &
-               stiffness)
+            call find_mean_slopes(system, k, i, slope)
+            do d = 1, size(slope, 2)
+               do c = 1, size(slope, 1)
+                  if (row(c, i) == 0 .or. row(d, i) == 0) cycle
+                  call system%problem%incidence%add_coupling( &
+                     row(c, i), row(d, i), 1, &
+                     cmplx(slope(c, d)*law%prediction%stiffness(i, d), kind=wp), stiffness)
+               end do
+            end do
          end do
       end associate
    end subroutine add_law
 
-   real(wp) function mean_slope(system, k, element) result(slope)
+   !> Slopes of an element (output, input): their mean over the motion where it is the stiffer.
+   subroutine find_mean_slopes(system, k, element, mean)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: k, element
-      real(wp) :: at_rest
+      real(wp), intent(out) :: mean(:, :)
+      real(wp) :: slope(size(mean, 1), size(mean, 2))
+      integer :: c, j
 
       associate (law => system%problem%forces%entry(k)%law, work => system%work(k))
-         at_rest = law%slope_at(element, 0.0_wp)
-         slope = sum(law%slope_at(element, work%prediction_time(element, 1, :)))/ &
-                 size(work%prediction_time, 3)
-         slope = at_rest + max(0.0_wp, slope - at_rest)
+         mean = 0.0_wp
+         do j = 1, size(work%prediction_time, 3)
+            call law%slopes_about(element, work%prediction_time(element, :, j), slope)
+            mean = mean + slope
+         end do
+         mean = mean/size(work%prediction_time, 3)
+         call law%slopes_about(element, [(0.0_wp, c=1, size(mean, 1))], slope)
+         if (sum([(mean(c, c) - slope(c, c), c=1, size(mean, 1))]) < 0.0_wp) mean = slope
       end associate
-   end function mean_slope
+   end subroutine find_mean_slopes
 
    !> Whether the structure holds a static load with its pairs closed but free of friction.
    logical function held_without_friction(system) result(held)

@@ -41,6 +41,7 @@ module fw_incidence
       procedure :: scatter_row
       procedure :: scatter_harmonic
       procedure :: add_block
+      procedure :: add_coupling
       procedure :: add_mapped_block
       procedure :: add_coefficients
       procedure :: add_diagonal
@@ -266,6 +267,24 @@ contains
          end do
       end do
    end subroutine add_block
+
+   !> matrix = matrix + B_n^H k B_n with the rows of an output and of an input.
+   pure subroutine add_coupling(self, row_out, row_in, h, stiffness, matrix)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row_out, row_in, h
+      complex(wp), intent(in) :: stiffness
+      complex(wp), intent(inout) :: matrix(:, :)
+      integer :: e, f
+
+      do f = self%first(row_in), self%first(row_in + 1) - 1
+         do e = self%first(row_out), self%first(row_out + 1) - 1
+            associate (entry => matrix(self%coordinate(e), self%coordinate(f)))
+               entry = entry + conjg(harmonic_weight(self, e, h))*harmonic_weight(self, f, h)* &
+                       stiffness
+            end associate
+         end do
+      end do
+   end subroutine add_coupling
 
    !> matrix = matrix + B_n^H k B_n with the rows of an output and of an input, both mapped.
    !> In single precision: the matrix is that of the preconditioner.

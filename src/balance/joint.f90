@@ -1,9 +1,11 @@
-!> The nonlinear coordinates of a case: which components of which pairs and which springs can move
-!> at all, and the relative coordinates that carry them.
+!> The nonlinear coordinates of a case: which components of which pairs, which springs and other
+!> elements can move at all, and the relative coordinates that carry them.
 module fw_joint
    use fw_kinds, only: wp
+   use fw_case_forces, only: element_rows
    use fw_contact_data, only: contact_type, spring_type, memory_carried
    use fw_cyclic_relative, only: cyclic_relative, new_cyclic_relative
+   use fw_elements, only: element_list
    use fw_error, only: error_type, fatal_error, status_input
    use fw_force_law, only: law_facts
    use fw_laws, only: facts_of, pairs_are_rigid
@@ -22,6 +24,8 @@ module fw_joint
       integer, allocatable :: row(:, :)
       !> Row of each spring (n_springs).
       integer, allocatable :: spring_row(:)
+      !> Rows of the inputs of other elements, for each kind; elements share rows of the same dofs.
+      type(element_rows), allocatable :: element_row(:)
       !> Components that nothing ever moves (3, n_pairs), and how many of them were dropped.
       logical, allocatable :: idle(:, :)
       integer :: n_idle = 0
@@ -37,20 +41,21 @@ module fw_joint
 
 contains
 
-   subroutine new_joint(model, contact, springs, skip_idle, self, error)
+   subroutine new_joint(model, contact, springs, elements, skip_idle, self, error)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
+      type(element_list), intent(in) :: elements
       !> Leave out components that nothing moves.
       logical, intent(in) :: skip_idle
       type(joint_type), intent(out) :: self
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: side_1(:), side_2(:), sector_2(:), first(:)
       logical, allocatable :: moving(:), rigid(:)
-      integer :: i, c, k, n_pairs, n_rows, n_springs
+      integer :: i, c, k, n_pairs, n_rows, n_springs, n_others
 
       ! Before the rows are numbered: what never moves needs none.
-      call find_moving_dofs(model, contact, springs, moving)
+      call find_moving_dofs(model, contact, springs, elements, moving)
       allocate (self%row(3, contact%n_pairs), source=0)
       allocate (self%idle(3, contact%n_pairs), source=.false.)
       ! Pairs and springs of all sectors are those of the first.
@@ -87,8 +92,11 @@ contains
          side_2 = [side_2, springs%side_2(:n_springs)]
          sector_2 = [sector_2, (sector_of(springs%sector_2, i), i=1, n_springs)]
       end if
-      if (model%cyclic%is_mistuned) call repeat_rows(model%cyclic%n_sectors, n_pairs, n_rows, self)
-      self%half_wave_symmetric = symmetric(model, contact, springs, self)
+      n_others = n_rows + n_springs
+      call list_elements(elements, n_others, side_1, side_2, sector_2, self%element_row)
+      if (model%cyclic%is_mistuned) call repeat_rows(model%cyclic%n_sectors, n_pairs, n_rows, &
+                                                     size(side_1) - n_others, self)
+      self%half_wave_symmetric = symmetric(model, contact, springs, elements, self)
       if (model%cyclic%is_cyclic) then
          call new_cyclic_relative(model, side_1, side_2, sector_2, self%cyclic)
          return
@@ -97,21 +105,63 @@ contains
       call check_independent(contact, self, error)
    end subroutine new_joint
 
-   !> Rows of the pairs of all sectors, sector after sector, then those of the springs.
-   pure subroutine repeat_rows(n_sectors, n_pairs, n_rows, self)
+   !> Rows of the inputs of elements, behind those that there are: one for each difference of dofs.
+   pure subroutine list_elements(elements, n_before, side_1, side_2, sector_2, element_row)
+      type(element_list), intent(in) :: elements
+      !> Rows of pairs and springs.
+      integer, intent(in) :: n_before
+      integer, allocatable, intent(inout) :: side_1(:), side_2(:), sector_2(:)
+      type(element_rows), allocatable, intent(out) :: element_row(:)
+      integer :: c, i, k, r
+
+      if (.not. allocated(elements%slot)) then
+         allocate (element_row(0))
+         return
+      end if
+      allocate (element_row(size(elements%slot)))
+      do k = 1, size(elements%slot)
+         associate (group => elements%slot(k)%group)
+            allocate (element_row(k)%row(group%n_in, group%n_elements), source=0)
+            do i = 1, group%n_elements
+               do c = 1, group%n_in
+                  associate (one => group%row_side_1(c, i), two => group%row_side_2(c, i), &
+                             sector => group%row_sector_2(c, i))
+                     if (one == 0 .and. two == 0) cycle
+                     do r = n_before + 1, size(side_1)
+                        if (side_1(r) == one .and. side_2(r) == two .and. &
+                            sector_2(r) == sector) exit
+                     end do
+                     if (r > size(side_1)) then
+                        side_1 = [side_1, one]
+                        side_2 = [side_2, two]
+                        sector_2 = [sector_2, sector]
+                     end if
+                     element_row(k)%row(c, i) = r
+                  end associate
+               end do
+            end do
+         end associate
+      end do
+   end subroutine list_elements
+
+   !> Rows of the pairs of all sectors, sector after sector, then those of the springs, then those
+   !> of other elements.
+   pure subroutine repeat_rows(n_sectors, n_pairs, n_rows, n_others, self)
       integer, intent(in) :: n_sectors
-      !> Pairs of a sector, and their rows.
-      integer, intent(in) :: n_pairs, n_rows
+      !> Pairs of a sector, and their rows; rows of elements that are neither pairs nor springs.
+      integer, intent(in) :: n_pairs, n_rows, n_others
       type(joint_type), intent(inout) :: self
-      integer, allocatable :: first(:, :), springs(:)
-      integer :: i, j, n
+      integer, allocatable :: first(:, :), others(:, :), springs(:)
+      integer :: i, j, k, last, n
 
       first = self%row(:, :n_pairs)
       springs = self%spring_row
       n = size(springs)
       deallocate (self%spring_row)
       allocate (self%spring_row(n*n_sectors))
-      allocate (self%row_in_sector((n_rows + n)*n_sectors), self%sector((n_rows + n)*n_sectors))
+      last = n_sectors*(n_rows + n)
+      allocate (self%row_in_sector(last + n_others*n_sectors))
+      allocate (self%sector(last + n_others*n_sectors))
       do j = 0, n_sectors - 1
          self%row(:, j*n_pairs + 1:(j + 1)*n_pairs) = merge(first + j*n_rows, 0, first > 0)
          self%idle(:, j*n_pairs + 1:(j + 1)*n_pairs) = self%idle(:, :n_pairs)
@@ -120,6 +170,20 @@ contains
          self%row_in_sector(self%spring_row(j*n + 1:(j + 1)*n)) = springs
          self%sector(j*n_rows + 1:(j + 1)*n_rows) = j
          self%sector(self%spring_row(j*n + 1:(j + 1)*n)) = j
+         self%row_in_sector(last + j*n_others + 1:last + (j + 1)*n_others) = &
+            [(n_rows + n + i, i=1, n_others)]
+         self%sector(last + j*n_others + 1:last + (j + 1)*n_others) = j
+      end do
+      do k = 1, size(self%element_row)
+         others = self%element_row(k)%row
+         associate (rows => self%element_row(k))
+            deallocate (rows%row)
+            allocate (rows%row(size(others, 1), size(others, 2)*n_sectors))
+            do j = 0, n_sectors - 1
+               rows%row(:, j*size(others, 2) + 1:(j + 1)*size(others, 2)) = &
+                  merge(others - n_rows - n + last + j*n_others, 0, others > 0)
+            end do
+         end associate
       end do
       self%n_idle = n_sectors*self%n_idle
    end subroutine repeat_rows
@@ -187,10 +251,11 @@ contains
 
    !> Dofs that a load can reach through the matrices, the pairs and the springs (0:n_dof; entry
    !> 0, the ground, never moves). What no load reaches stays at rest exactly.
-   subroutine find_moving_dofs(model, contact, springs, moving)
+   subroutine find_moving_dofs(model, contact, springs, elements, moving)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
+      type(element_list), intent(in) :: elements
       logical, intent(out), allocatable :: moving(:)
       integer :: i, c, n_moving
 
@@ -226,6 +291,7 @@ contains
          do i = 1, springs%n_springs
             call couple(springs%side_1(i), springs%side_2(i))
          end do
+         call couple_elements()
          if (allocated(model%cyclic%air)) then
             associate (touched => any(abs(model%cyclic%air%modes) > 0.0_wp, dim=1))
                if (any(touched .and. moving(1:))) moving(1:) = moving(1:) .or. touched
@@ -248,15 +314,33 @@ contains
          moving(0) = .false.
       end subroutine couple
 
+      !> All inputs of an element hang together.
+      subroutine couple_elements()
+         integer :: e, k
+         integer, allocatable :: dofs(:)
+
+         if (.not. allocated(elements%slot)) return
+         do k = 1, size(elements%slot)
+            associate (group => elements%slot(k)%group)
+               do e = 1, group%n_elements
+                  dofs = abs([group%row_side_1(:, e), group%row_side_2(:, e)])
+                  if (any(moving(dofs))) moving(dofs) = .true.
+                  moving(0) = .false.
+               end do
+            end associate
+         end do
+      end subroutine couple_elements
+
    end subroutine find_moving_dofs
 
    !> Half-wave symmetry is exact where nothing static acts, nor a load of an even harmonic, normal
    !> loads are constant, springs are odd, and no pair carries a static force over from an earlier
    !> point of the sweep.
-   logical function symmetric(model, contact, springs, joint)
+   logical function symmetric(model, contact, springs, elements, joint)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
+      type(element_list), intent(in) :: elements
       type(joint_type), intent(in) :: joint
       type(law_facts) :: facts
 
@@ -269,6 +353,7 @@ contains
                      contact%memory /= memory_carried
       end if
       if (springs%n_springs > 0) symmetric = symmetric .and. all(modulo(springs%power, 2) == 1)
+      symmetric = symmetric .and. elements%are_odd()
    end function symmetric
 
    !> Rigid contact forces are determined only where the pairs move independently of each other.

@@ -15,12 +15,14 @@
 module fw_parameter_slopes
    use fw_balance_state, only: balance_state
    use fw_complex_form, only: amplitudes_of, coefficients_of
+   use fw_elements, only: element_kind
    use fw_force_law, only: force_law, force_workspace, pair_mixed, pair_open, pair_stuck
    use fw_fourier, only: fourier_type, new_fourier
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-      is_per_pair, normal_coefficient, normal_load, normal_stiffness, reference_force, &
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
+      is_of_matrices, is_per_pair, normal_coefficient, normal_load, normal_stiffness, &
+      parameter_group, reference_force, &
       spring_coefficient, static_scale, tangential_stiffness
    use fw_recovery, only: observe
    implicit none (type, external)
@@ -154,6 +156,7 @@ contains
       type(balance_state), intent(inout) :: state
       type(parameter_entry), intent(in) :: parameter
       type(parameter_slope), intent(inout) :: slope
+      character(24) :: group
 
       call clear(state, slope)
       if (is_per_pair(parameter%number)) then
@@ -163,10 +166,15 @@ contains
       else
          select case (parameter%number)
          case (spring_coefficient)
-            call by_spring(state, parameter%element, slope)
+            call by_element(state, state%problem%forces%springs, parameter%element, slope)
          case (harmonic_scale, static_scale)
             call by_load(self, state, parameter, slope)
          case default
+            if (is_of_elements(parameter%number)) then
+               call parameter_group(parameter%number, group)
+               call by_element(state, state%problem%forces%elements(element_kind(trim(group))), &
+                               parameter%element, slope)
+            end if
             if (is_of_matrices(parameter%number)) call by_matrices(self, state, parameter, slope)
          end select
          ! Laws that take the balance feel what the structure and the springs have changed.
@@ -324,29 +332,31 @@ contains
       end select
    end subroutine multiply_twin
 
-   !> The force of a unit coefficient of one spring.
-   subroutine by_spring(state, element, slope)
+   !> The force of a unit coefficient of one spring or other element.
+   subroutine by_element(state, law, value, slope)
       type(balance_state), intent(inout) :: state
-      integer, intent(in) :: element
+      !> Its place in the list.
+      integer, intent(in) :: law
+      !> Place of the coefficient among those of the input.
+      integer, intent(in) :: value
       type(parameter_slope), intent(inout) :: slope
       real(wp), allocatable :: unit(:, :, :)
-      integer :: k
+      integer :: c, element, number
 
-      do k = 1, state%problem%forces%n_laws
-         if (k == state%problem%forces%pairs) cycle
-         associate (entry => state%problem%forces%entry(k))
-            if (entry%law%n_parameters() == 0 .or. entry%row(1, element) == 0) cycle
-            allocate (unit, mold=state%work(k)%force)
-            call entry%law%by_parameter(1, state%problem%fourier, state%work(k), unit)
-            call state%problem%incidence%scatter_row(entry%row(1, element), &
+      associate (entry => state%problem%forces%entry(law))
+         call entry%law%find_parameter(value, element, number)
+         allocate (unit, mold=state%work(law)%force)
+         call entry%law%by_parameter(number, state%problem%fourier, state%work(law), unit)
+         do c = 1, size(entry%row, 1)
+            if (entry%row(c, element) == 0) cycle
+            call state%problem%incidence%scatter_row(entry%row(c, element), &
                                                      state%problem%incidence%identity, &
                                                      size(slope%residual, 1), &
                                                      size(slope%residual, 1), 1.0_wp, &
-                                                     unit(element, 1, :), slope%residual)
-            return
-         end associate
-      end do
-   end subroutine by_spring
+                                                     unit(element, c, :), slope%residual)
+         end do
+      end associate
+   end subroutine by_element
 
    !> Loads are proportional to their factors: those above harmonic 0, or those of it.
    subroutine by_load(self, state, parameter, slope)

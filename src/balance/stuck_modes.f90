@@ -90,55 +90,64 @@ contains
       integer, intent(in) :: first
       complex(wp), intent(inout) :: block(:, :)
       logical, intent(inout) :: held(:)
-      real(wp) :: slope
+      real(wp) :: force, slope
       integer :: c, i, k, row
 
       do k = 1, system%problem%forces%n_laws
-         associate (entry => system%problem%forces%entry(k), work => system%work(k))
-            do i = 1, size(entry%row, 2)
-               do c = 1, size(entry%row, 1)
-                  row = entry%row(c, i)
-                  if (row == 0) cycle
-                  ! Pairs alone open; the state of springs says nothing here.
-                  if (k == system%problem%forces%pairs .and. &
-                      (work%state(i) == pair_open .or. c < first)) cycle
-                  slope = slope_of(system, k, i, c)
-                  if (.not. abs(slope) > 0.0_wp) cycle
-                  if (entry%law%prediction%takes(i)) then
-                     held(system%problem%incidence%coordinate_of(row)) = .true.
-                  else
-                     call system%problem%incidence%add_block(row, h, &
-                        cmplx(entry%law%prediction%stiffness(i, c)*slope, kind=wp), block)
-                  end if
-               end do
-            end do
-         end associate
+         if (k == system%problem%forces%pairs) cycle
+         do i = 1, size(system%problem%forces%entry(k)%row, 2)
+            call add_element(system, k, i, h, block)
+         end do
       end do
+      associate (entry => system%problem%forces%entry(system%problem%forces%pairs), &
+                 work => system%work(system%problem%forces%pairs))
+         do i = 1, size(entry%row, 2)
+            do c = first, size(entry%row, 1)
+               row = entry%row(c, i)
+               if (row == 0 .or. work%state(i) == pair_open) cycle
+               ! Stuck, whatever slipped on the way to rest.
+               slope = entry%law%slope_at_rest(i, c)
+               if (c == 3 .and. entry%law%facts%is_curved) then
+                  call entry%law%press_at(i, work%prediction(i, 3, 1) + work%offset(i), force, &
+                                          slope)
+               end if
+               if (.not. abs(slope) > 0.0_wp) cycle
+               if (entry%law%prediction%takes(i)) then
+                  held(system%problem%incidence%coordinate_of(row)) = .true.
+               else
+                  call system%problem%incidence%add_block(row, h, &
+                     cmplx(entry%law%prediction%stiffness(i, c)*slope, kind=wp), block)
+               end if
+            end do
+         end do
+      end associate
    end subroutine add_slopes
 
-   !> Pairs: stuck, whatever slipped on the way to rest. Springs: the slope at their elongation.
-   real(wp) function slope_of(system, law, element, component) result(slope)
+   !> Slopes of a spring or another element at its elongation.
+   subroutine add_element(system, law, element, h, block)
       type(balance_state), intent(in) :: system
-      integer, intent(in) :: law, element, component
-      real(wp) :: elongation, force
+      integer, intent(in) :: law, element, h
+      complex(wp), intent(inout) :: block(:, :)
+      real(wp) :: rest(system%problem%forces%entry(law)%law%n_components)
+      real(wp) :: slope(size(rest), size(rest))
+      integer :: c, d
 
       associate (entry => system%problem%forces%entry(law), work => system%work(law))
-         if (law == system%problem%forces%pairs) then
-            slope = entry%law%slope_at_rest(element, component)
-            if (component == 3 .and. entry%law%facts%is_curved) then
-               call entry%law%press_at(element, work%prediction(element, 3, 1) + &
-                                       work%offset(element), force, slope)
-            end if
-         else
-            elongation = 0.0_wp
-            ! Harmonic 0 is the first of those retained.
-            if (system%problem%fourier%has_constant()) then
-               elongation = work%prediction(element, component, 1)
-            end if
-            slope = entry%law%slope_at(element, elongation)
-         end if
+         rest = 0.0_wp
+         ! Harmonic 0 is the first of those retained.
+         if (system%problem%fourier%has_constant()) rest = work%prediction(element, :, 1)
+         call entry%law%slopes_about(element, rest, slope)
+         do d = 1, size(rest)
+            do c = 1, size(rest)
+               if (entry%row(c, element) == 0 .or. entry%row(d, element) == 0) cycle
+               if (.not. abs(slope(c, d)) > 0.0_wp) cycle
+               call system%problem%incidence%add_coupling( &
+                  entry%row(c, element), entry%row(d, element), h, &
+                  cmplx(entry%law%prediction%stiffness(element, d)*slope(c, d), kind=wp), block)
+            end do
+         end do
       end associate
-   end function slope_of
+   end subroutine add_element
 
    !> M x = value (K + shift M) x, so that massless coordinates are no exception.
    subroutine solve_undamped(self, done)

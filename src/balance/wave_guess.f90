@@ -30,19 +30,33 @@ contains
                      call add_slope(cmplx(entry%law%prediction%stiffness(i, 3), kind=wp))
                   end if
                end do
-            else if (.not. closed .and. entry%law%n_components == 1) then
-               if (entry%law%prediction%order(1) > 0) cycle
-               do i = 1, entry%law%n_elements
-                  row = entry%row(1, i)
-                  if (row > 0) call add_slope(cmplx(mean_slope(system, k, i)* &
-                                                    entry%law%prediction%stiffness(i, 1), kind=wp))
-               end do
+            else if (.not. closed) then
+               call add_elements(k)
             end if
          end associate
       end do
       waves_are_held = holds_waves(system, slope, fixed)
 
    contains
+
+      !> Each row for itself.
+      subroutine add_elements(k)
+         integer, intent(in) :: k
+         real(wp) :: mean(system%problem%forces%entry(k)%law%n_components, &
+                          system%problem%forces%entry(k)%law%n_components)
+         integer :: c, i
+
+         associate (entry => system%problem%forces%entry(k))
+            do i = 1, entry%law%n_elements
+               call find_mean_slopes(system, k, i, mean)
+               do c = 1, size(mean, 1)
+                  row = entry%row(c, i)
+                  if (row == 0) cycle
+                  call add_slope(cmplx(mean(c, c)*entry%law%prediction%stiffness(i, c), kind=wp))
+               end do
+            end do
+         end associate
+      end subroutine add_elements
 
       subroutine add_slope(added)
          complex(wp), intent(in) :: added

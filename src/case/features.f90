@@ -197,6 +197,8 @@ contains
       select case (phrase)
       case ('a case without contact pairs')
          asked = .not. pairs
+      case ('elements beside pairs and springs')
+         asked = case%elements%n_elements() > 0
       case ("contact%memory = 'carried'")
          asked = pairs .and. case%contact%memory == memory_carried
       case ('pairs with two tangential directions')

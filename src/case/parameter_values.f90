@@ -6,9 +6,10 @@ module fw_parameter_values
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_forming, only: form_structure
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-      is_per_pair, is_per_spring, modal_damping, normal_load, normal_stiffness, parameter_key, &
-      rayleigh_mass, rayleigh_stiffness, rotation_speed, static_scale, tangential_stiffness
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
+      is_of_matrices, is_per_pair, is_per_spring, modal_damping, normal_load, normal_stiffness, &
+      parameter_group, parameter_key, rayleigh_mass, rayleigh_stiffness, rotation_speed, &
+      static_scale, tangential_stiffness
    implicit none (type, external)
    private
 
@@ -21,10 +22,15 @@ contains
       class(body_type), intent(in) :: case
       !> As in parameter_words.
       integer, intent(in) :: number
+      character(24) :: group
 
       n_values = 1
       if (is_per_pair(number)) n_values = case%contact%n_pairs
       if (is_per_spring(number)) n_values = case%springs%n_springs
+      if (is_of_elements(number)) then
+         call parameter_group(number, group)
+         n_values = case%elements%count_of(trim(group))
+      end if
    end function n_values
 
    !> Values in the case (n_values).
@@ -47,6 +53,10 @@ contains
          case default
             if (is_per_spring(number)) then
                values = case%springs%coefficient
+               return
+            else if (is_of_elements(number)) then
+               call parameter_group(number, key)
+               values = case%elements%coefficients_of(trim(key))
                return
             else if (is_per_pair(number)) then
                call parameter_key(number, key)
@@ -94,6 +104,10 @@ contains
             call parameter_key(number, key)
             if (is_per_pair(number)) call c%constants%set(trim(key), values)
             if (is_per_spring(number)) case%springs%coefficient = values
+            if (is_of_elements(number)) then
+               call parameter_group(number, key)
+               call case%elements%set_coefficients(trim(key), values)
+            end if
             if (is_of_matrices(number)) call put_of_matrices(case, number, values(1), error)
          end select
       end associate

@@ -37,9 +37,8 @@ module fw_part
 
    character(*), parameter :: scalar = 'one_or '
 
-   !> Extents that parts share.
-   character(*), parameter :: words(*) = [character(9) :: 'dof', 'pair', 'spring', 'load', &
-      'quantity', 'interface', 'order', 'motion', 'row']
+   !> Words of shapes that stand for extents which parts share, at most.
+   integer, parameter :: most_words = 32
 
    !> Goes through the parts of a model. After a failure nothing more is taken.
    type, abstract :: part_source
@@ -56,7 +55,8 @@ module fw_part
       real(wp), pointer :: reals(:) => null()
       integer, allocatable :: integers(:)
       type(string_type), allocatable :: texts(:)
-      integer, private :: extent(size(words)) = -1
+      character(12), private :: word(most_words) = ''
+      integer, private :: extent(most_words) = -1
    contains
       generic :: bind => bind_text, bind_texts, bind_integer, bind_integers, bind_integer_matrix, &
          bind_reals, bind_matrix, bind_complex, bind_complex_matrix
@@ -176,7 +176,7 @@ contains
       integer :: k
 
       n = index('0123456789', word) - 1
-      k = findloc(words == word, .true., dim=1)
+      k = findloc(self%word == word, .true., dim=1)
       if (k > 0) n = self%extent(k)
    end function extent_of
 
@@ -184,8 +184,12 @@ contains
       class(part_source), intent(inout) :: self
       character(*), intent(in) :: word
       integer, intent(in) :: n
+      integer :: k
 
-      where (words == word) self%extent = n
+      k = findloc(self%word == word, .true., dim=1)
+      if (k == 0) k = findloc(self%word == '', .true., dim=1)
+      self%word(k) = word
+      self%extent(k) = n
    end subroutine set_extent
 
    !> Whether there is such a part; then its values are taken.

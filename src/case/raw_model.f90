@@ -3,10 +3,12 @@
 module fw_raw_model
    use fw_contact_data, only: contact_type, spring_type
    use fw_cyclic_parts, only: cyclic_parts
+   use fw_elements, only: element_list
    use fw_kinds, only: wp
    use fw_law_text, only: all_laws
    use fw_laws, only: law_words
    use fw_normal_law, only: normal_words
+   use fw_part_keys, only: part_keys
    use fw_part, only: by_columns, either_way, part, part_source, part_type
    use fw_text, only: string_type, to_text
    implicit none (type, external)
@@ -30,6 +32,8 @@ module fw_raw_model
       type(contact_type) :: contact
       !> Nonlinear springs, with what the model says of them.
       type(spring_type) :: springs
+      !> Other elements, likewise.
+      type(element_list) :: elements
       !> Loads (n_dof) [force]; the last per square of the rotation speed.
       real(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
       real(wp), allocatable :: load_static_rotation(:)
@@ -70,6 +74,7 @@ contains
       call bind_structure(self, to)
       call bind_pairs(self%contact, to)
       call bind_springs(self%springs, to)
+      call bind_elements(self%elements, to)
       call bind_loads(self, to)
       call bind_observed(self, to)
       call self%cyclic%bind_parts(to)
@@ -201,6 +206,21 @@ contains
                         with_springs), springs%coefficient)
       call to%bind(part('spring/power', each, '3 without it'), springs%power)
    end subroutine bind_springs
+
+   !> The arrays of a group are the parts of its keys.
+   subroutine bind_elements(elements, to)
+      type(element_list), intent(inout) :: elements
+      class(part_source), intent(inout), target :: to
+      type(part_keys) :: keys
+      integer :: k
+
+      if (.not. allocated(elements%slot)) call elements%start()
+      keys%to => to
+      do k = 1, size(elements%slot)
+         call keys%open(elements%slot(k)%group%name(), '')
+         call elements%slot(k)%group%bind_keys(keys)
+      end do
+   end subroutine bind_elements
 
    subroutine bind_loads(self, to)
       class(raw_model), intent(inout) :: self

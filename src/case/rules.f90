@@ -178,6 +178,12 @@ module fw_rules
       rule_type('sweep%stability = .true.', 'a law without Floquet multipliers', &
                 "use contact%law = 'penalty'")]
 
+   !> Groups of elements that are neither pairs nor springs.
+   type(rule_type), parameter :: of_elements(*) = [ &
+      rule_type('elements beside pairs and springs', "case%analysis = 'time'", &
+                "use 'frf' or 'point'"), &
+      rule_type('elements beside pairs and springs', 'sweep%stability = .true.', 'leave it out')]
+
    type(rule_type), parameter :: of_wear(*) = [ &
       rule_type("case%analysis = 'wear'", 'a case without contact pairs', &
                 'give group &contact, or take a model file with contact'), &
@@ -191,7 +197,7 @@ module fw_rules
                 "'rosenbrock' or 'bdf'")]
 
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, of_laws, &
-                                             of_wear, of_derivatives]
+                                             of_elements, of_wear, of_derivatives]
 
 contains
 

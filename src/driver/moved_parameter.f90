@@ -10,14 +10,15 @@ module fw_moved_parameter
    use fw_case, only: case_type
    use fw_case_forces, only: new_forces
    use fw_contact_data, only: contact_type, spring_type
+   use fw_elements, only: element_list
    use fw_error, only: error_type
    use fw_force_list, only: force_list
    use fw_kinds, only: wp
    use fw_moved_structure, only: move_structure
    use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
    use fw_parameter_values, only: get_parameter, put_parameter
-   use fw_parameters, only: harmonic_scale, is_of_loads, is_of_matrices, is_per_pair, &
-      is_per_spring, static_scale
+   use fw_parameters, only: harmonic_scale, is_of_loads, is_of_matrices, is_per_element, &
+      static_scale
    implicit none (type, external)
    private
 
@@ -66,6 +67,7 @@ contains
          ! are large, and stay.
          self%case%contact = case%contact
          self%case%springs = case%springs
+         self%case%elements = case%elements
          self%case%harmonics%filter_harmonics = case%harmonics%filter_harmonics
       end if
    end function new_moved_parameter
@@ -109,7 +111,7 @@ contains
             call move_structure(self%case, self%holds_eps, state, error)
          else
             call renew_laws(state%problem, self%case%contact, self%case%springs, &
-                            self%case%harmonics%filter_harmonics)
+                            self%case%elements, self%case%harmonics%filter_harmonics)
             call state%renew_workspaces()
          end if
       end associate
@@ -117,16 +119,18 @@ contains
 
    !> The laws of a problem anew, from pairs and springs whose constants have changed since it was
    !> built. States take new workspaces then.
-   subroutine renew_laws(problem, contact, springs, filter_harmonics)
+   subroutine renew_laws(problem, contact, springs, elements, filter_harmonics)
       type(balance_problem), intent(inout) :: problem
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
+      type(element_list), intent(in) :: elements
       !> As in harmonics_options.
       integer, intent(in) :: filter_harmonics
       type(force_list) :: laws
       integer :: k
 
-      call new_forces(contact, springs, problem%joint%row, problem%joint%spring_row, &
+      call new_forces(contact, springs, elements, problem%joint%row, problem%joint%spring_row, &
+                      problem%joint%element_row, &
                       problem%forces%entry(problem%forces%pairs)%law%facts%locates_events, &
                       filter_harmonics, laws)
       do k = 1, laws%n_laws
@@ -193,7 +197,7 @@ contains
       end if
       do i = 1, size(values)
          entry%value = values(i)
-         if (is_per_pair(self%number) .or. is_per_spring(self%number)) entry%element = i
+         if (is_per_element(self%number)) entry%element = i
          rate = 1.0_wp
          if (self%by_factor) rate = self%base(i)
          call finder%find(state, entry, one)

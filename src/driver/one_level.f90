@@ -92,7 +92,7 @@ contains
 
       goes_on = request%fallback .and. .not. self%level%solver%method%unbounded &
                 .and. .not. self%level%solver%found_ripple &
-                .and. case%contact%n_pairs + case%springs%n_springs > 0 &
+                .and. case%has_joint() &
                 .and. case%contact%memory /= memory_carried
       if (goes_on .and. associated(request%interrupt)) goes_on = .not. request%interrupt%is_due()
    end function goes_on

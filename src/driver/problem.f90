@@ -44,8 +44,8 @@ contains
       type(case_type), intent(in) :: case
 
       n = case%threads
-      if ((3*case%contact%n_pairs + case%springs%n_springs)*case%model%cyclic%n_solved() < &
-          coordinates_for_threads) n = 1
+      if ((3*case%contact%n_pairs + case%springs%n_springs + case%elements%n_elements())* &
+          case%model%cyclic%n_solved() < coordinates_for_threads) n = 1
    end function threads_for
 
    !> Build the problem of a case, and a state of it at the first frequency of its sweep.
@@ -147,15 +147,16 @@ contains
                   .not. analyses(case%analysis)%is_free
       ! A gap that closes into an interference does so too.
       if (case%over%number == gap) skip_idle = .false.
-      call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
+      call new_joint(case%model, case%contact, case%springs, case%elements, skip_idle, joint, &
+                     error)
       if (allocated(error)) return
       ! No load moves a mode, and none has to.
       if (analyses(case%analysis)%is_free) joint%idle = .false.
       if (present(forces)) then
          laws = forces
       else
-         call new_forces(case%contact, case%springs, joint%row, joint%spring_row, &
-                         locates_events(case, harmonics, joint), harmonics%filter_harmonics, laws)
+         call new_forces(case%contact, case%springs, case%elements, joint%row, joint%spring_row, &
+                         joint%element_row, locates_events(case, harmonics, joint), harmonics%filter_harmonics, laws)
       end if
       call choose_harmonics(case, harmonics, joint, laws, fourier, error)
       if (allocated(error)) return
@@ -274,8 +275,8 @@ contains
          if (.not. joint%half_wave_symmetric) then
             call fatal_error(error, '&harmonics parity = ''odd'': the response has even '// &
                              'harmonics, because of a static load, a load of an even '// &
-                             'harmonic, a normal dof, a moving side or an even spring '// &
-                             'power; use '// &
+                             'harmonic, a normal dof, a moving side or an even power '// &
+                             'of a force; use '// &
                              '''auto'' or ''all''', status_input)
             return
          end if

@@ -253,10 +253,7 @@ contains
          'the harmonics: they are chosen for harmonics%accuracy = '// &
          to_text(case%harmonics%accuracy)//'; give one of both')
       if (case%harmonics%n_harmonics > 1) return
-      if (case%contact%n_pairs + case%springs%n_springs == 0) return
-      if (case%springs%n_springs > 0 .and. case%contact%n_pairs == 0) then
-         if (all(case%springs%power == 1)) return
-      end if
+      if (.not. case%is_nonlinear()) return
       call remarks%add('one harmonic', 'the balance keeps one harmonic, and friction or gaps '// &
                        'may be off by half with it: set harmonics%accuracy, or compare with '// &
                        'more harmonics%n_harmonics')

@@ -13,7 +13,7 @@ module fw_sensitivity_solver
    use fw_mode_system, only: mode_system
    use fw_parameter_slopes, only: parameter_entry
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: is_of_matrices, is_per_pair, is_per_spring
+   use fw_parameters, only: is_of_matrices, is_per_element
    use fw_point, only: point_sensitivity, point_type
    use fw_remarks, only: remark_list
    use fw_response_rows, only: load_scale, mode_damping_ratio, mode_omega, resonance_omega
@@ -152,7 +152,7 @@ contains
             call get_parameter(case, entry%number, values)
             do i = 1, size(values)
                entry%value = values(i)
-               if (is_per_pair(entry%number) .or. is_per_spring(entry%number)) entry%element = i
+               if (is_per_element(entry%number)) entry%element = i
                finder%parameters = [finder%parameters, entry]
             end do
          end do

@@ -91,6 +91,8 @@ contains
 
       if (is_of_matrices(case%varied) .or. is_of_matrices(case%resonance%parameter) .or. &
           self%harmonics%filter_harmonics > 0) return
+      ! What holds a motion beside pairs and springs is not looked through.
+      if (case%elements%n_elements() > 0) return
       range = case%sweep%start
       if (analyses(case%analysis)%is_sweep) range = case%sweep%range()
       call self%search%start(case%model, case%contact, case%springs, &

@@ -101,6 +101,9 @@ module fw_force_law
       logical :: acts_at_once = .false.
       !> How hard elements press is no straight line of their normal input.
       logical :: is_curved = .false.
+      !> Forces depend on the frequency while their inputs are held, as a law makes rates of
+      !> displacements by itself: `by_frequency` has the derivative.
+      logical :: has_frequency = .false.
       !> Instants below which the sampling error exceeds that of the truncation: in all, for each
       !> harmonic, and for each harmonic where elements may separate or the normal load varies.
       !> (The defaults are those of friction.)
@@ -205,7 +208,10 @@ module fw_force_law
       procedure :: input_of_slope
       procedure :: input_of_pressure
       procedure :: pressing_constant
+      procedure :: slopes_about
       procedure :: n_parameters
+      procedure :: find_parameter
+      procedure :: by_frequency
       procedure :: by_parameter
       procedure :: instants_wanted
    end type force_law
@@ -269,7 +275,9 @@ contains
       class(prediction_type), intent(in) :: self
       integer, intent(in) :: element, component
 
-      order = self%order(component)
+      order = 0
+      ! Elements of more components take displacements.
+      if (component <= size(self%order)) order = self%order(component)
       if (allocated(self%own)) order = self%own(element)%order(component)
    end function order_of
 
@@ -545,6 +553,45 @@ contains
       associate (unused => self, unused_element => element)
       end associate
    end function pressing_constant
+
+   !> Slopes of the forces of an element about a position at rest y (component): (output, input).
+   subroutine slopes_about(self, element, y, slope)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(out) :: slope(:, :)
+      integer :: c
+
+      slope = 0.0_wp
+      do c = 1, size(y)
+         slope(c, c) = self%slope_at(element, y(c))
+      end do
+   end subroutine slopes_about
+
+   !> Derivative of the forces by the frequency where the inputs are held, at the last evaluation, in
+   !> `work%output`: of most laws there is none, and facts say so.
+   subroutine by_frequency(self, fourier, work)
+      class(force_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      work%output = 0.0_wp
+      associate (unused => self, unused_fourier => fourier)
+      end associate
+   end subroutine by_frequency
+
+   !> Which element, and which of its constants, the value of a parameter is (see by_parameter).
+   pure subroutine find_parameter(self, value, element, number)
+      class(force_law), intent(in) :: self
+      !> Its place among those of the input.
+      integer, intent(in) :: value
+      integer, intent(out) :: element, number
+
+      element = value
+      number = 1
+      associate (unused => self)
+      end associate
+   end subroutine find_parameter
 
    !> Constants of each element by which `by_parameter` differentiates.
    pure integer function n_parameters(self)

@@ -27,6 +27,10 @@ module fw_force_list
       integer :: n_laws = 0
       !> Place of the law of the contact pairs.
       integer :: pairs = 0
+      !> Place of the law of each kind of elements, 0 where there are none (n_element_kinds), and of
+      !> the springs.
+      integer, allocatable :: elements(:)
+      integer :: springs = 0
       type(force_entry), allocatable :: entry(:)
    contains
       procedure :: add

@@ -61,7 +61,8 @@ contains
       if (.not. (case%model%cyclic%is_cyclic .and. case%model%cyclic%is_mistuned)) return
       associate (n => case%model%cyclic%n_sectors)
          ! Relative coordinates of a sector at most; few modes are kept beside.
-         n_slots = (3.0_wp*case%contact%n_pairs + case%springs%n_springs)/n
+         n_slots = (3.0_wp*case%contact%n_pairs + case%springs%n_springs)/n + &
+                   case%elements%n_elements()
          blocks = 3.0_wp*n_slots**2*n*(case%harmonics%n_harmonics + 1.0_wp)
          call require_memory(blocks, '&cyclic mistuned = .true. with n_sectors = '// &
                              to_text(n)//', '//to_text(case%contact%n_pairs/n)//' pairs in '// &

@@ -11,10 +11,11 @@ module fw_parameter_checks
    use fw_normal_law, only: curved_pairs, exponential, pairs_with, power, table
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-      is_per_pair, is_per_spring, normal_coefficient, normal_load, normal_stiffness, not_negative, &
-      of_closing, of_pressed, of_sliding, parameter_key, parameter_words, parameters, positive, &
-      reference_force, rotation_speed, static_scale, tangential_stiffness
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
+      is_of_matrices, is_per_pair, is_per_spring, normal_coefficient, normal_load, &
+      normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, parameter_group, &
+      parameter_key, parameter_words, parameters, positive, reference_force, rotation_speed, &
+      static_scale, tangential_stiffness
    use fw_solver_options, only: continuation_natural
    use fw_values, only: number_text
    implicit none (type, external)
@@ -36,11 +37,16 @@ contains
       character(*), intent(in) :: asked_by
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: reason
+      character(24) :: group
 
       if (is_per_pair(number)) then
          call check_of_pairs(case%contact, number, reason)
       else if (is_per_spring(number)) then
          if (case%springs%n_springs == 0) reason = 'there are no springs: give group &spring'
+      else if (is_of_elements(number)) then
+         call parameter_group(number, group)
+         if (case%elements%count_of(trim(group)) == 0) reason = 'there are no such elements: '// &
+            'give group &'//trim(group)
       else if (is_of_matrices(number)) then
          call check_of_matrices(case, number, reason)
       else

@@ -9,8 +9,8 @@ module fw_point_quantities
    use fw_case, only: case_type
    use fw_hdf5, only: growing_integer, growing_logical, growing_real
    use fw_kinds, only: wp
-   use fw_parameters, only: is_per_pair, is_per_spring, n_parameter_words, parameter_dataset, &
-      parameter_words
+   use fw_parameters, only: is_of_elements, is_per_pair, is_per_spring, n_parameter_words, &
+      parameter_dataset, parameter_group, parameter_words
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
@@ -179,11 +179,14 @@ contains
       !> The dimension of the elements that a parameter has a value for each of.
       pure function elements_of(parameter) result(dimension)
          integer, intent(in) :: parameter
-         character(8) :: dimension
+         character(24) :: dimension
 
          dimension = ''
          if (is_per_pair(parameter)) dimension = ' pair'
          if (is_per_spring(parameter)) dimension = ' spring'
+         if (.not. is_of_elements(parameter)) return
+         call parameter_group(parameter, dimension)
+         dimension = ' '//dimension(:23)
       end function elements_of
 
       !> A line of the table.
@@ -249,8 +252,9 @@ contains
          n = 3
       case ('part')
          n = 2
-      case default ! instants, multipliers
-         n = unknown_size
+      case default ! elements of a group; instants, multipliers
+         n = case%elements%count_of(dimension)
+         if (n == 0) n = unknown_size
       end select
    end function size_of
 

@@ -15,7 +15,7 @@ module fw_read_case
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
-   use fw_read_contact, only: read_contact, read_springs
+   use fw_read_elements, only: read_contact, read_elements, read_springs
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_mode, read_sweep
@@ -215,23 +215,13 @@ contains
          call reader%amend('harmonics', 'n_harmonics', to_text(usual_harmonics))
          return
       end if
-      if (.not. has_nonlinear(case) .or. .not. goes_with_accuracy(case)) return
+      if (.not. case%is_nonlinear() .or. .not. goes_with_accuracy(case)) return
       case%harmonics%accuracy = usual_accuracy
       case%harmonics%n_harmonics = most_for_accuracy
       case%harmonics%is_chosen = .true.
       call reader%amend('harmonics', 'accuracy', number_text(usual_accuracy))
       call reader%amend('harmonics', 'n_harmonics', to_text(most_for_accuracy))
    end subroutine choose_harmonics
-
-   !> Whether the response has harmonics that the load has not: a spring of power 1 is linear.
-   pure logical function has_nonlinear(case)
-      type(case_type), intent(in) :: case
-
-      has_nonlinear = case%contact%n_pairs > 0
-      if (case%springs%n_springs > 0) then
-         has_nonlinear = has_nonlinear .or. any(case%springs%power > 1)
-      end if
-   end function has_nonlinear
 
    !> Whether an accuracy could have been asked for; see fw_combinations.
    pure logical function goes_with_accuracy(case)
@@ -370,7 +360,8 @@ contains
          call append(case%inputs, worn)
       end if
       call read_springs(reader, raw%springs, case%model%cyclic%n_solved(), case%springs)
-      call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
+      call read_elements(reader, raw%elements, case%elements)
+      call check_sectors(reader, case%model%cyclic, case%contact, case%springs, case%elements)
       ! A number of 0 was meant.
       case%idle_contact = case%contact%n_pairs == 0 .and. reader%has_group('contact') .and. &
                           .not. reader%given('contact', 'n_pairs')

@@ -2,6 +2,7 @@
 !> springs across sectors.
 module fw_read_cyclic
    use fw_contact_data, only: contact_type, spring_type
+   use fw_elements, only: element_list
    use fw_cyclic_data, only: cyclic_type
    use fw_cyclic_parts, only: cyclic_parts
    use fw_cyclic_keys, only: bind_interfaces, bind_sectors, no_order
@@ -107,13 +108,14 @@ contains
                                     ' twice: a dof stands once, on one interface')
    end subroutine check_interfaces
 
-   !> Pairs and springs between sectors.
-   subroutine check_sectors(reader, cyclic, contact, springs)
+   !> Pairs, springs and other elements between sectors.
+   subroutine check_sectors(reader, cyclic, contact, springs, elements)
       type(reader_type), intent(inout) :: reader
       type(cyclic_type), intent(in) :: cyclic
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
-      integer :: i
+      type(element_list), intent(in) :: elements
+      integer :: c, i, k
 
       if (reader%failed()) return
       ! Those of all sectors are those of the first.
@@ -122,6 +124,16 @@ contains
       end do
       do i = 1, springs%n_springs/cyclic%n_solved()
          call check_element('spring', i, springs%sector_2(i), springs%side_2(i) /= 0)
+      end do
+      do k = 1, size(elements%slot)
+         associate (group => elements%slot(k)%group)
+            do i = 1, group%n_elements
+               do c = 1, group%n_in
+                  call check_element(trim(group%name()), i, group%row_sector_2(c, i), &
+                                     group%row_side_2(c, i) /= 0)
+               end do
+            end do
+         end associate
       end do
       if (.not. reader%failed()) call check_mirrored(reader, cyclic, contact)
 

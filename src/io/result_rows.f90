@@ -88,6 +88,7 @@ contains
       sizes%over = case%over
       sizes%contact%n_pairs = case%contact%n_pairs
       sizes%springs%n_springs = case%springs%n_springs
+      sizes%elements = case%elements
       if (allocated(case%model%unit_system)) sizes%model%unit_system = case%model%unit_system
       if (allocated(case%model%observe_matrix)) then
          allocate (sizes%model%observe_matrix(case%model%n_observed(), 0))

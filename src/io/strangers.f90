@@ -31,8 +31,7 @@ module fw_strangers
       not_offered_type('aero/matrix', of_air), &
       not_offered_type('structural_damping', of_damping), &
       not_offered_type('hysteretic_damping', of_damping), &
-      not_offered_type('gyroscopic', 'give the matrix for each rad/s as /coriolis'), &
-      not_offered_type('polynomial', 'give nonlinear springs as /spring')]
+      not_offered_type('gyroscopic', 'give the matrix for each rad/s as /coriolis')]
 
    !> Attributes that programs write by themselves, or people as labels: no part of a model. A star
    !> stands for any ending.

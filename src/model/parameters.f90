@@ -7,7 +7,8 @@ module fw_parameters
 
    public :: parameter_type, parameters, parameter_words, n_parameter_words, parameter_number, &
              parameter_group, parameter_key, parameter_dataset
-   public :: is_of_loads, is_of_matrices, is_per_pair, is_per_spring
+   public :: is_of_elements, is_of_loads, is_of_matrices, is_per_element, is_per_pair, &
+             is_per_spring
    public :: harmonic_scale, static_scale, friction_coefficient, normal_load, gap, &
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
              rotation_speed, rayleigh_mass, rayleigh_stiffness, normal_coefficient, reference_force
@@ -19,8 +20,10 @@ module fw_parameters
                          rotation_speed = 10, rayleigh_mass = 11, rayleigh_stiffness = 12, &
                          normal_coefficient = 13, reference_force = 14
 
-   !> Where its values are: one of the loads, one for each pair or spring, one of the matrices.
-   integer, parameter :: of_loads = 1, of_pairs = 2, of_springs = 3, of_matrices = 4
+   !> Where its values are: one of the loads, one for each pair or spring, one of the matrices, one
+   !> for each of a group of other elements (its coefficient).
+   integer, parameter :: of_loads = 1, of_pairs = 2, of_springs = 3, of_matrices = 4, &
+                         of_elements = 5
    !> Pairs that it says something of: those with tangential dofs, with a normal dof, or those that
    !> a constant load presses, as they have no normal dof.
    integer, parameter :: of_sliding = 1, of_closing = 2, of_pressed = 3
@@ -55,7 +58,8 @@ module fw_parameters
       parameter_type('model%rayleigh_mass', of_matrices, not_negative), &
       parameter_type('model%rayleigh_stiffness', of_matrices, not_negative), &
       parameter_type('contact%normal_coefficient', of_pairs, positive, of_closing), &
-      parameter_type('contact%reference_force', of_pairs, positive, of_closing)]
+      parameter_type('contact%reference_force', of_pairs, positive, of_closing), &
+      parameter_type('polynomial%coefficient', of_elements)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word
@@ -119,6 +123,20 @@ contains
 
       is_per_spring = is_of(number, of_springs)
    end function is_per_spring
+
+   !> Whether each element of a group that is neither of pairs nor of springs has a value.
+   elemental logical function is_of_elements(number)
+      integer, intent(in) :: number
+
+      is_of_elements = is_of(number, of_elements)
+   end function is_of_elements
+
+   !> Whether it has a value for each element of some kind, pairs and springs among them.
+   elemental logical function is_per_element(number)
+      integer, intent(in) :: number
+
+      is_per_element = is_per_pair(number) .or. is_per_spring(number) .or. is_of_elements(number)
+   end function is_per_element
 
    !> Whether it changes matrices of the structure.
    elemental logical function is_of_matrices(number)

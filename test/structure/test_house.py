@@ -13,14 +13,14 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (89010, 1000),
-    "files of src": (401, 10),
+    "lines of src": (91000, 1000),
+    "files of src": (409, 10),
     "lines of the longest file": (777, 50),
     "modules used by one file, at most": (32, 2),
     "files that name forces%pairs": (42, 0),
     "files that name case_type": (54, 0),
     "files that name an analysis": (5, 0),
-    "files with select type": (18, 0),
+    "files with select type": (19, 0),
 }
 
 

@@ -1,0 +1,132 @@
+"""Elements that are neither pairs nor springs: a group of a model file for each kind.
+
+A kind is a dataclass here, whose fields are the datasets of its group (a text: an attribute), and
+a line in `KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._arguments import array
+from .errors import InputError
+
+__all__ = ["Elements", "Polynomial"]
+
+#: Factors of a term.
+MOST_FACTORS = 8
+
+
+@dataclass(frozen=True)
+class Elements:
+    """What all kinds have: the name of their group, and their fields as datasets."""
+
+    #: Group of the model file.
+    group: ClassVar[str] = ""
+
+    def checked(self, n_dof: int) -> Elements:
+        """The same with arrays, of a model of n_dof dofs."""
+        raise NotImplementedError
+
+    def datasets(self) -> dict[str, NDArray[Any]]:
+        """Arrays by their path."""
+        return {f"{self.group}/{field.name}": np.asarray(value) for field in fields(self)
+                if (value := getattr(self, field.name)) is not None
+                and not isinstance(value, str)}
+
+    def attributes(self) -> dict[str, str]:
+        """Words by their name."""
+        return {field.name: value for field in fields(self)
+                if isinstance(value := getattr(self, field.name), str)}
+
+
+@dataclass(frozen=True)
+class Polynomial(Elements):
+    """Forces that are polynomials of several dofs, term by term.
+
+    Parameters
+    ----------
+    factors : sequence of sequences of int
+        Signed dofs, counted from 1, that each term is the product of, repeated for powers: up to 8.
+        ``[1, 1, 2]`` is u1^2 u2.
+    coefficient : (n_terms,) float
+        Of each term.
+    of : str
+        'energy': the terms are a potential, whose gradient the forces are; 'force': a force on one
+        dof each, on the side of the stiffness.
+    dof : (n_terms,) int, optional
+        The dofs of these.
+    """
+
+    group: ClassVar[str] = "polynomial"
+    factors: ArrayLike
+    coefficient: ArrayLike
+    of: str = "energy"
+    dof: ArrayLike | None = None
+
+    def checked(self, n_dof: int) -> Polynomial:
+        """The same with arrays, factors (n_terms, 8)."""
+        if self.of not in ("energy", "force"):
+            raise InputError(f"polynomial.of: is {self.of!r}, must be 'energy' or 'force'")
+        try:
+            rows = [list(row) for row in self.factors]  # type: ignore[union-attr]
+        except TypeError:
+            raise InputError("polynomial.factors: must be a list of dofs for each term") from None
+        if any(len(row) > MOST_FACTORS for row in rows):
+            raise InputError(f"polynomial.factors: must be {MOST_FACTORS} dofs for a term at most")
+        filled = np.array([row + [0] * (MOST_FACTORS - len(row)) for row in rows] or
+                          np.zeros((0, MOST_FACTORS)))
+        factors = _dofs("polynomial.factors", filled, n_dof)
+        n = len(rows)
+        dof = None if self.dof is None else _dofs("polynomial.dof", np.asarray(self.dof), n_dof)
+        if dof is not None and dof.shape != (n,):
+            raise InputError(f"polynomial.dof: has shape {dof.shape}, must be ({n},)")
+        return Polynomial(factors, array("polynomial.coefficient", self.coefficient, (n,)),
+                          self.of, dof)
+
+
+#: Every kind by the name of its group.
+KINDS: dict[str, type[Elements]] = {kind.group: kind for kind in (Polynomial,)}
+
+
+def _dofs(name: str, values: NDArray[Any], n_dof: int) -> NDArray[np.int32]:
+    if values.size and (values.dtype.kind not in "iu" or np.abs(values).max() > n_dof):
+        raise InputError(f"{name}: must be dof numbers from -{n_dof} to {n_dof}")
+    return values.astype(np.int32)
+
+
+def checked_elements(elements: Iterable[Elements], n_dof: int) -> tuple[Elements, ...]:
+    """Elements of a model, each kind once."""
+    found: dict[str, Elements] = {}
+    for number, one in enumerate(elements):
+        if not isinstance(one, Elements):
+            raise InputError(f"elements[{number}]: is a {type(one).__name__}, must be one of "
+                             f"{', '.join(kind.__name__ for kind in KINDS.values())}")
+        if one.group in found:
+            raise InputError(f"elements[{number}]: is a second {type(one).__name__}, must be one")
+        found[one.group] = one.checked(n_dof)
+    return tuple(found.values())
+
+
+def read_elements(file: h5py.File) -> list[Elements]:
+    """Those of a model file."""
+    found = []
+    for group, kind in KINDS.items():
+        if group not in file:
+            continue
+        values: dict[str, Any] = {name: data[()] for name, data in file[group].items()}
+        values |= _words(file[group].attrs)
+        known = {field.name for field in fields(kind)}
+        found.append(kind(**{name: value for name, value in values.items() if name in known}))
+    return found
+
+
+def _words(attributes: Mapping[str, Any]) -> dict[str, str]:
+    return {name: value.decode() if isinstance(value, bytes) else str(value)
+            for name, value in attributes.items() if isinstance(value, (bytes, str))}

@@ -1,0 +1,148 @@
+!> All groups of elements that are neither pairs nor springs: the kinds that there are, and those
+!> of a case.
+module fw_elements
+   use fw_element_group, only: element_group, group_name_length
+   use fw_kinds, only: wp
+   use fw_polynomial_group, only: polynomial_group
+   implicit none (type, external)
+   private
+
+   public :: element_list, element_kind, element_slot, n_element_kinds
+
+   !> A new kind is a line in `new_group`, and one more here.
+   integer, parameter :: n_element_kinds = 1
+
+   type :: element_slot
+      class(element_group), allocatable :: group
+   end type element_slot
+
+   type :: element_list
+      !> A group for each kind, most of them empty; not allocated before `start`.
+      type(element_slot), allocatable :: slot(:)
+   contains
+      procedure :: start
+      procedure :: n_elements
+      procedure :: are_odd
+      procedure :: are_linear
+      procedure :: count_of
+      procedure :: coefficients_of
+      procedure :: set_coefficients
+   end type element_list
+
+contains
+
+   !> An empty group of a kind.
+   subroutine new_group(kind, group)
+      integer, intent(in) :: kind
+      class(element_group), allocatable, intent(out) :: group
+
+      select case (kind)
+      case (1); allocate (polynomial_group :: group)
+      case default ! no such kind
+      end select
+   end subroutine new_group
+
+   !> An empty group of each kind.
+   subroutine start(self)
+      class(element_list), intent(inout) :: self
+      integer :: k
+
+      if (allocated(self%slot)) deallocate (self%slot)
+      allocate (self%slot(n_element_kinds))
+      do k = 1, n_element_kinds
+         call new_group(k, self%slot(k)%group)
+      end do
+   end subroutine start
+
+   !> Elements of all kinds, of one sector.
+   pure integer function n_elements(self) result(n)
+      class(element_list), intent(in) :: self
+      integer :: k
+
+      n = 0
+      if (.not. allocated(self%slot)) return
+      do k = 1, size(self%slot)
+         n = n + self%slot(k)%group%n_elements
+      end do
+   end function n_elements
+
+   !> Whether opposite motions have opposite forces.
+   pure logical function are_odd(self)
+      class(element_list), intent(in) :: self
+      integer :: k
+
+      are_odd = .true.
+      if (.not. allocated(self%slot)) return
+      do k = 1, size(self%slot)
+         if (self%slot(k)%group%n_elements > 0) are_odd = are_odd .and. &
+            self%slot(k)%group%is_odd()
+      end do
+   end function are_odd
+
+   !> Whether all forces are in proportion to the motion.
+   pure logical function are_linear(self)
+      class(element_list), intent(in) :: self
+      integer :: k
+
+      are_linear = .true.
+      if (.not. allocated(self%slot)) return
+      do k = 1, size(self%slot)
+         if (self%slot(k)%group%n_elements > 0) are_linear = are_linear .and. &
+            self%slot(k)%group%is_linear()
+      end do
+   end function are_linear
+
+   !> Which kind a group of the namelist is; 0 where it is none of these.
+   integer function element_kind(name) result(kind)
+      character(*), intent(in) :: name
+      type(element_list) :: list
+      integer :: k
+
+      call list%start()
+      kind = 0
+      do k = 1, n_element_kinds
+         if (list%slot(k)%group%name() == name) kind = k
+      end do
+   end function element_kind
+
+   !> How many the group of a name gives.
+   pure integer function count_of(self, name) result(n)
+      class(element_list), intent(in) :: self
+      character(*), intent(in) :: name
+      integer :: k
+
+      n = 0
+      if (.not. allocated(self%slot)) return
+      do k = 1, size(self%slot)
+         if (self%slot(k)%group%name() == name) n = self%slot(k)%group%n_given
+      end do
+   end function count_of
+
+   !> Their coefficients.
+   pure function coefficients_of(self, name) result(values)
+      class(element_list), intent(in) :: self
+      character(*), intent(in) :: name
+      real(wp), allocatable :: values(:)
+      integer :: k
+
+      allocate (values(0))
+      if (.not. allocated(self%slot)) return
+      do k = 1, size(self%slot)
+         if (self%slot(k)%group%name() /= name) cycle
+         if (allocated(self%slot(k)%group%coefficient)) values = self%slot(k)%group%coefficient
+      end do
+   end function coefficients_of
+
+   pure subroutine set_coefficients(self, name, values)
+      class(element_list), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(wp), intent(in) :: values(:)
+      integer :: k
+
+      if (.not. allocated(self%slot)) return
+      do k = 1, size(self%slot)
+         if (self%slot(k)%group%name() == name) self%slot(k)%group%coefficient = values
+      end do
+   end subroutine set_coefficients
+
+end module fw_elements
