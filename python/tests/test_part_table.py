@@ -34,7 +34,8 @@ def whole(**more: Any) -> fw.Model:
     """A model with every part that one of its kind can have."""
     more = {"contact": PAIRS, **more}
     return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, springs=[fw.Spring(1, 2, 0.5)],
-                    elements=[fw.Polynomial([[1, -2, 2]], [0.1], of="force", dof=[3])],
+                    elements=[fw.Polynomial([[1, -2, 2]], [0.1], of="force", dof=[3]),
+                              fw.Damper([1], [0.1], [2], [1.5], [2], [0])],
                     static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
                     stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
                     observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)

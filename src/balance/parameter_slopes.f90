@@ -22,8 +22,7 @@ module fw_parameter_slopes
    use fw_lapack, only: dgemv
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
       is_of_matrices, is_per_pair, normal_coefficient, normal_load, normal_stiffness, &
-      parameter_group, reference_force, &
-      spring_coefficient, static_scale, tangential_stiffness
+      parameter_group, reference_force, spring_coefficient, static_scale, tangential_stiffness
    use fw_recovery, only: observe
    implicit none (type, external)
    private

@@ -59,7 +59,8 @@ module fw_parameters
       parameter_type('model%rayleigh_stiffness', of_matrices, not_negative), &
       parameter_type('contact%normal_coefficient', of_pairs, positive, of_closing), &
       parameter_type('contact%reference_force', of_pairs, positive, of_closing), &
-      parameter_type('polynomial%coefficient', of_elements)]
+      parameter_type('polynomial%coefficient', of_elements), &
+      parameter_type('damper%coefficient', of_elements)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word
