@@ -67,7 +67,7 @@ contains
                call add_outputs(self, entry, work, not_open(p, work, .false.), &
                                 self%problem%incidence%identity, m, dr)
             end if
-            if (in_time .and. entry%law%facts%has_frequency) then
+            if (in_time .and. p%has_frequency) then
                call entry%law%by_frequency(self%problem%fourier, work)
                call add_outputs(self, entry, work, not_open(p, work, .false.), &
                                 self%problem%incidence%identity, m, dr)

@@ -44,6 +44,9 @@ module fw_force_law
       !> (n_elements): those of the law are then the highest order, and whether any element does.
       !> Who deals with one element asks `order_of`, `in_time` and `takes`.
       type(input_facts), allocatable :: own(:)
+      !> Forces depend on the frequency while their inputs are held, as a law makes rates of
+      !> displacements by itself: `by_frequency` has the derivative.
+      logical :: has_frequency = .false.
       !> Makes the input of the displacement or its derivative (n_elements, 3 or 1): [force/length]
       !> where y is a force.
       real(wp), allocatable :: stiffness(:, :)
@@ -101,9 +104,6 @@ module fw_force_law
       logical :: acts_at_once = .false.
       !> How hard elements press is no straight line of their normal input.
       logical :: is_curved = .false.
-      !> Forces depend on the frequency while their inputs are held, as a law makes rates of
-      !> displacements by itself: `by_frequency` has the derivative.
-      logical :: has_frequency = .false.
       !> Instants below which the sampling error exceeds that of the truncation: in all, for each
       !> harmonic, and for each harmonic where elements may separate or the normal load varies.
       !> (The defaults are those of friction.)
@@ -569,7 +569,8 @@ contains
    end subroutine slopes_about
 
    !> Derivative of the forces by the frequency where the inputs are held, at the last evaluation, in
-   !> `work%output`: of most laws there is none, and facts say so.
+   !> `work%output`: of most laws there is none, and the
+   !> prediction says so.
    subroutine by_frequency(self, fourier, work)
       class(force_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier

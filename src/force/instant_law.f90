@@ -89,7 +89,7 @@ contains
       self%n_in = n_in
       self%takes_rates = takes_rates
       self%prediction%stiffness = 1.0_wp
-      self%facts%has_frequency = takes_rates
+      self%prediction%has_frequency = takes_rates
    end subroutine take_inputs
 
    subroutine reserve(self, fourier, work)
