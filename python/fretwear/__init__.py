@@ -48,7 +48,7 @@ from .analyses import frf, mode, resonance, run, wear
 from .bifurcation import Bifurcation
 from .case import Case
 from .design import calibrate, optimise
-from .elements import Polynomial
+from .elements import Damper, Polynomial
 from .errors import (
     AbsentError,
     ConvergenceError,
@@ -63,7 +63,7 @@ from .result import Result
 from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
 
-__all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
+__all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError", "Damper",
            "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
            "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring", "Steps",
            "__version__", "calibrate", "frf", "mode", "optimise", "resonance", "run", "wear"]

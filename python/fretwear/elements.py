@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._arguments import array
 from .errors import InputError
 
-__all__ = ["Elements", "Polynomial"]
+__all__ = ["Damper", "Elements", "Polynomial"]
 
 #: Factors of a term.
 MOST_FACTORS = 8
@@ -91,8 +91,54 @@ class Polynomial(Elements):
                           self.of, dof)
 
 
+@dataclass(frozen=True)
+class Damper(Elements):
+    """Nonlinear dampers: force ``coefficient * u**position_power * |v|**(power - 1) * v``.
+
+    u is u(side_1) - u(side_2), v its rate. One value may stand for all dampers, but for side_1.
+
+    Parameters
+    ----------
+    side_1 : (n_dampers,) int
+        Signed dofs, counted from 1.
+    coefficient : float or (n_dampers,)
+        c [force time^p/length^(p + q)].
+    side_2 : int or (n_dampers,), optional
+        Dofs of the other side; 0 is the ground.
+    power : float or (n_dampers,), optional
+        p, 1 or more: 1 is viscous, 2 drag.
+    position_power : int or (n_dampers,), optional
+        q, 0 or more.
+    sector_2 : int or (n_dampers,), optional
+        Of cyclic structures: sector of side 2, counted from that of side 1.
+    """
+
+    group: ClassVar[str] = "damper"
+    side_1: ArrayLike
+    coefficient: ArrayLike
+    side_2: ArrayLike | None = None
+    power: ArrayLike | None = None
+    position_power: ArrayLike | None = None
+    sector_2: ArrayLike | None = None
+
+    def checked(self, n_dof: int) -> Damper:
+        """The same with arrays (n_dampers)."""
+        side_1 = np.atleast_1d(np.asarray(self.side_1))
+        n = len(side_1)
+        values: dict[str, Any] = {
+            name: array(f"damper.{name}", np.broadcast_to(np.asarray(value, dtype=float), (n,)),
+                        (n,))
+            for name in ("coefficient", "power") if (value := getattr(self, name)) is not None}
+        for name in ("side_2", "position_power", "sector_2"):
+            if (value := getattr(self, name)) is not None:
+                values[name] = np.array(np.broadcast_to(np.asarray(value), (n,)), dtype=np.int32)
+        if "side_2" in values:
+            _dofs("damper.side_2", values["side_2"], n_dof)
+        return Damper(_dofs("damper.side_1", side_1, n_dof), **values)
+
+
 #: Every kind by the name of its group.
-KINDS: dict[str, type[Elements]] = {kind.group: kind for kind in (Polynomial,)}
+KINDS: dict[str, type[Elements]] = {kind.group: kind for kind in (Polynomial, Damper)}
 
 
 def _dofs(name: str, values: NDArray[Any], n_dof: int) -> NDArray[np.int32]:

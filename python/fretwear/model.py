@@ -64,6 +64,15 @@ class ContactPairs:
         last elements slip over that lost before ('iwan').
     bouc_wen_exponent, bouc_wen_beta : float or (n_pairs,), optional
         n, 1 or 2, and the shape of the loops, 0.5 to 1 ('bouc_wen').
+    normal_law : str or sequence of str, optional
+        How pairs with a normal dof press, one word or one each: 'unilateral', 'power',
+        'exponential', 'table'.
+    normal_coefficient, normal_exponent : float or (n_pairs,), optional
+        Of 'power': pressure c d**e of the overclosure d [force/length^e], [-].
+    reference_force, decay_length : float or (n_pairs,), optional
+        Of 'exponential': pressure p_0 exp(d/h) [force], [length].
+    table : (n_table, 2), optional
+        Of 'table': overclosures in ascending order [length] and forces from 0 up [force].
     law : str or sequence of str, optional
         The law of the pairs where a case does not name one: 'penalty', 'rigid', ..., or that of
         each (n_pairs).
@@ -96,6 +105,12 @@ class ContactPairs:
     bouc_wen_exponent: ArrayLike | None = None
     bouc_wen_beta: ArrayLike | None = None
     law: str | Sequence[str] | None = None
+    normal_law: str | Sequence[str] | None = None
+    normal_coefficient: ArrayLike | None = None
+    normal_exponent: ArrayLike | None = None
+    reference_force: ArrayLike | None = None
+    decay_length: ArrayLike | None = None
+    table: ArrayLike | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -106,12 +121,10 @@ class ContactPairs:
             name: None if getattr(self, name) is None else
             array(f"contact.{name}", getattr(self, name), (n_pairs,))
             for name in ("mu", "gap", "area", *_IN_NAMELIST)}
-        if isinstance(self.law, str):
-            values["law"] = text("contact.law", self.law)
-        elif self.law is not None:
-            if len(self.law) != n_pairs:
-                raise InputError(f"contact.law: must be one word, or {n_pairs}, one per pair")
-            values["law"] = tuple(text("contact.law", word) for word in self.law)
+        values["law"] = _words("contact.law", self.law, n_pairs)
+        values["normal_law"] = _words("contact.normal_law", self.normal_law, n_pairs)
+        if self.table is not None:
+            values["table"] = array("contact.table", self.table, (None, 2))
         if self.sector_2 is not None:
             values["sector_2"] = _whole_numbers("contact.sector_2", self.sector_2, n_pairs)
         if self.position is not None:
@@ -360,7 +373,7 @@ class Model:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
                 "mass", "stiffness", "damping", "stiffness_rotation", "coriolis",
-                *_CONTACT, *_LOADS, "contact/law",
+                *_CONTACT, *_LOADS, "contact/law", "contact/normal_law", "contact/table",
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
             try:
@@ -394,15 +407,19 @@ class Model:
         pairs = {f"contact/{name}": values for name in _IN_NAMELIST
                  if (values := getattr(self.contact, name, None)) is not None}
         try:
-            groups: dict[str, Mapping[str, int | str]] = {}
+            groups: dict[str, dict[str, int | str]] = {}
             if self.sectors is not None:
-                groups["cyclic"] = self.sectors.attributes()
-            if self.contact is not None and self.contact.law is not None:
-                if isinstance(self.contact.law, str):
-                    groups["contact"] = {"law": self.contact.law}
-                else:
-                    pairs["contact/law"] = strings(self.contact.law)
-            groups |= {one.group: words for one in self.elements if (words := one.attributes())}
+                groups["cyclic"] = dict(self.sectors.attributes())
+            for name in ("law", "normal_law"):
+                words = getattr(self.contact, name, None)
+                if isinstance(words, str):
+                    groups.setdefault("contact", {})[name] = words
+                elif words is not None:
+                    pairs[f"contact/{name}"] = strings(words)
+            if (table := getattr(self.contact, "table", None)) is not None:
+                pairs["contact/table"] = table
+            groups.update((one.group, dict(words)) for one in self.elements
+                          if (words := one.attributes()))
             write_model_file(path, {**self._datasets(), **pairs, **self._spring_datasets()},
                              title=self.title, unit_system=self.unit_system, groups=groups)
         except OSError as error:
@@ -472,8 +489,13 @@ class Model:
             if self.contact.patch is not None:
                 session.put_texts("contact/patch", self.contact.patch)
             settings += [(f"contact%{name}", literal(getattr(self.contact, name)))
-                         for name in ("law", *_IN_NAMELIST)
+                         for name in ("law", "normal_law", *_IN_NAMELIST)
                          if getattr(self.contact, name) is not None]
+            if self.contact.table is not None:
+                table = np.asarray(self.contact.table)
+                settings += [("contact%n_table", literal(len(table))),
+                             ("contact%overclosure", literal(table[:, 0])),
+                             ("contact%force", literal(table[:, 1]))]
         return tuple(settings)
 
     def _spring_settings(self) -> list[tuple[str, str]]:
@@ -491,7 +513,9 @@ _CONTACT = tuple(f"contact/{name}" for name in (
 _SLIDING = ("slip_speed", "mu_dynamic", "weakening_speed", "weakening_exponent", "mu_viscous",
             "speed_1", "speed_2")
 _HYSTERESIS = ("iwan_chi", "iwan_beta", "bouc_wen_exponent", "bouc_wen_beta")
-_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness", *_SLIDING, *_HYSTERESIS)
+_PRESSING = ("normal_coefficient", "normal_exponent", "reference_force", "decay_length")
+_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness", *_PRESSING, *_SLIDING,
+                *_HYSTERESIS)
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
 
@@ -587,12 +611,24 @@ def _contact_of(found: Mapping[str, Any], file: h5py.File) -> ContactPairs | Non
         "side_2", "sector_2", "mu", "gap", "area", "position", *_IN_NAMELIST)}
     patch = found.get("contact/patch")
     names = None if patch is None else [_text(name) for name in patch]
-    law: str | list[str] | None = None
-    if "law" in file["contact"].attrs:
-        law = _text(file["contact"].attrs["law"])
-    elif "contact/law" in found:
-        law = [_text(word) for word in found["contact/law"]]
-    return ContactPairs(found["contact/side_1"], **parts, patch=names, law=law)
+    words: dict[str, str | list[str]] = {}
+    for name in ("law", "normal_law"):
+        if name in file["contact"].attrs:
+            words[name] = _text(file["contact"].attrs[name])
+        elif f"contact/{name}" in found:
+            words[name] = [_text(word) for word in found[f"contact/{name}"]]
+    return ContactPairs(found["contact/side_1"], **parts, patch=names,
+                        table=found.get("contact/table"), **words)
+
+
+def _words(name: str, words: str | Sequence[str] | None,
+           n_pairs: int) -> str | tuple[str, ...] | None:
+    """One word for all pairs, or one for each."""
+    if words is None or isinstance(words, str):
+        return None if words is None else text(name, words)
+    if len(words) != n_pairs:
+        raise InputError(f"{name}: must be one word, or {n_pairs}, one per pair")
+    return tuple(text(name, word) for word in words)
 
 
 def _whole_numbers(name: str, values: ArrayLike, n: int) -> NDArray[np.int64]:

@@ -26,11 +26,16 @@ UNITS: dict[str, str] = {
     "model%rayleigh_mass": "1/s",
     "model%rayleigh_stiffness": "s",
     "model%rotation_speed": "rad/s",
+    "contact%overclosure": "L",
+    "contact%force": "F",
     "contact%gap": "L",
     "contact%area": "L^2",
     "contact%normal_load": "F",
     "contact%tangential_stiffness": "F/L",
     "contact%normal_stiffness": "F/L",
+    "contact%normal_coefficient": "F/L^e",
+    "contact%reference_force": "F",
+    "contact%decay_length": "L",
     "contact%slip_speed": "L/s",
     "contact%weakening_speed": "L/s",
     "contact%mu_viscous": "s/L",
@@ -193,8 +198,8 @@ class Contact(TypedDict, total=False):
     mu: ArrayLike
     #: [L] initial gap; negative: interference, which preloads (default: of the file, else 0)
     gap: ArrayLike
-    #: [L^2] of a pair: from contact forces to pressure; only: analysis = 'wear' (default: of the
-    #: file, else required for wear)
+    #: [L^2] of a pair: from contact forces to pressure; only: analysis = 'wear', normal_per_area
+    #: (default: of the file, else required for wear, per area)
     area: ArrayLike
     #: [F] constant compressive force; only: pairs without a normal dof (default: of the file, else
     #: required with friction)
@@ -206,6 +211,18 @@ class Contact(TypedDict, total=False):
     #: [F/L] contact stiffness; 0 without a normal dof; only: law = 'penalty', 'regularised'
     #: (default: of the file, else required with normal dofs)
     normal_stiffness: ArrayLike
+    #: [F/L^e] c of normal_law = 'power', pressure c d**e of the overclosure d; 0 for pairs of
+    #: others; only: law = 'penalty', 'regularised' (default: of the file, else required with
+    #: 'power')
+    normal_coefficient: ArrayLike
+    #: e of normal_law = 'power': 1.5 Hertz; only: law = 'penalty', 'regularised' (default: 1.5)
+    normal_exponent: ArrayLike
+    #: [F] p_0 of normal_law = 'exponential', pressure p_0 exp(d/h); 0 for pairs of others; only:
+    #: law = 'penalty', 'regularised' (default: of the file, else required with 'exponential')
+    reference_force: ArrayLike
+    #: [L] h of normal_law = 'exponential'; 0 for pairs of others; only: law = 'penalty',
+    #: 'regularised' (default: of the file, else required with 'exponential')
+    decay_length: ArrayLike
     #: [L/s] sliding velocity du/dt at which tanh(1) = 76 % of the friction acts; only: law =
     #: 'regularised' (required with tangential dofs)
     slip_speed: ArrayLike
@@ -371,8 +388,8 @@ class Sweep(_Sweep, total=False):
     n_points: int
     #: points of a branch at most; only: continuation = 'arclength' (default: 1000)
     max_points: int
-    #: compute the Floquet multipliers of every point; only: springs and law = 'penalty' (default:
-    #: .false.)
+    #: compute the Floquet multipliers of every point; only: springs, law = 'penalty', 'regularised'
+    #: (default: .false.)
     stability: bool
     #: points that are solved to find maxima become rows, in order; only: analysis = 'frf',
     #: continuation = 'natural' (default: .false.)

@@ -25,6 +25,8 @@ PAIRS = fw.ContactPairs(
     tangential_stiffness=1.0, normal_stiffness=1.0, slip_speed=1.0, patch=["a"], sector_2=[0],
     mu_dynamic=0.2, weakening_speed=1.0, weakening_exponent=1.0, mu_viscous=0.0, speed_1=0.0,
     speed_2=0.0, iwan_chi=-0.5, iwan_beta=0.0, bouc_wen_exponent=1.0, bouc_wen_beta=0.5,
+    normal_coefficient=1.0, normal_exponent=1.5, reference_force=1.0,
+    decay_length=1.0, table=[[0.0, 0.0], [1.0, 2.0]], normal_law="power",
     law="penalty")
 EYE = np.eye(6)
 
@@ -33,7 +35,8 @@ def whole(**more: Any) -> fw.Model:
     """A model with every part that one of its kind can have."""
     more = {"contact": PAIRS, **more}
     return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, springs=[fw.Spring(1, 2, 0.5)],
-                    elements=[fw.Polynomial([[1, -2, 2]], [0.1], of="force", dof=[3])],
+                    elements=[fw.Polynomial([[1, -2, 2]], [0.1], of="force", dof=[3]),
+                              fw.Damper([1], [0.1], [2], [1.5], [2], [0])],
                     static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
                     stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
                     observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
@@ -49,7 +52,8 @@ def nodal() -> fw.Model:
 
 MODELS = {
     "plain": whole,
-    "laws": lambda: whole(contact=replace(PAIRS, law=["penalty"])),
+    "laws": lambda: whole(contact=replace(PAIRS, law=["penalty"],
+                                            normal_law=["power"])),
     "sector": lambda: whole(sectors=fw.Sectors(3, [1], [-4], air=fw.Air({0: np.eye(2)},
                                                                         modes=EYE[:2]))),
     "nodal": nodal}

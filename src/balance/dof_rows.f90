@@ -88,7 +88,8 @@ contains
          if (.not. contact%mu(i) > 0.0_wp) then
             if (c < 3) row%is_mixed = .false.
             if (c < 3) return
-            row%is_mixed = row%is_mixed .and. .not. work%always_closed(i)
+            row%is_mixed = row%is_mixed .and. &
+                           (entry%law%facts%is_curved .or. .not. work%always_closed(i))
          end if
          associate (p => entry%law%prediction)
             row%is_held = p%takes(i)

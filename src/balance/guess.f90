@@ -13,11 +13,26 @@ module fw_guess
 
    public :: stuck_guess, free_guess, held_without_contact, held_without_friction
    ! For the submodule alone, which gfortran lets reach no private procedures.
-   public :: find_mean_slopes, elastic_slope, solve_free, find_tension
+   public :: find_mean_slopes, elastic_slope, solve_free, find_tension, gap_of, rest_type
 
    !> Rounds of opening pairs under tension; each opens at least one pair or is the last. Those of
    !> them that also close pairs.
    integer, parameter :: max_rounds = 20, rounds_of_both = 12
+
+   !> Steps of Newton's method to where curved pairs rest, and change of their inputs that ends it.
+   integer, parameter :: most_steps = 60
+   real(wp), parameter :: rest_tolerance = 1.0e-9_wp
+   !> Part of the largest pressure below which such a pair counts as open.
+   real(wp), parameter :: no_pressure = 1.0e-9_wp
+
+   !> Pairs of a law whose pressure is curved, about where they rest: springs of a slope, from a gap
+   !> on (n_pairs). Of other laws nothing is allocated.
+   type :: rest_type
+      !> Normal inputs.
+      real(wp), allocatable :: y(:)
+      !> [force/length], [length]
+      real(wp), allocatable :: slope(:), gap(:)
+   end type rest_type
 
    ! The same where equal sectors are told apart (fw_wave_guess).
    interface
@@ -27,9 +42,10 @@ module fw_guess
          logical, intent(in) :: closed
       end function waves_are_held
 
-      module subroutine solve_sectors(system, closed, x, tension)
+      module subroutine solve_sectors(system, closed, rest, x, tension)
          type(balance_state), intent(in) :: system
          logical, intent(in) :: closed(:)
+         type(rest_type), intent(in) :: rest
          real(wp), intent(out), contiguous :: x(:)
          real(wp), intent(out) :: tension(:)
       end subroutine solve_sectors
@@ -43,19 +59,106 @@ contains
       real(wp), intent(out), contiguous :: x(:)
       logical :: closed(system%problem%n_pairs), bears(system%problem%n_pairs)
       real(wp) :: tension(system%problem%n_pairs)
+      type(rest_type) :: rest
       integer :: round
 
       closed = .true.
       do round = 1, merge(max_rounds, 0, size(closed) > 0)
-         call linear_solution(system, closed, .true., x, tension)
+         call come_to_rest(system, closed, x, tension, rest)
          bears = .not. tension > 0.0_wp
          ! Of late only opened: rounds that close pairs again could go on for ever.
          if (round > rounds_of_both .or. .not. closes_again(system)) bears = bears .and. closed
          if (all(bears .eqv. closed)) exit
          closed = bears
       end do
-      call linear_solution(system, closed, .false., x, tension)
+      call linear_solution(system, closed, .false., rest, x, tension)
    end subroutine stuck_guess
+
+   !> The position at rest with closed pairs stuck: linear, or by Newton's method where pressures
+   !> are curved. Steep as the structure to begin with, they come down to it step by step.
+   subroutine come_to_rest(system, closed, x, tension, rest)
+      type(balance_state), intent(in) :: system
+      logical, intent(in) :: closed(:)
+      real(wp), intent(out), contiguous :: x(:)
+      real(wp), intent(out) :: tension(:)
+      type(rest_type), intent(inout) :: rest
+      real(wp) :: opening(size(closed)), before(size(closed)), change
+      integer :: m, step
+
+      m = system%problem%structure%n_coordinates
+      associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
+         if (.not. law%facts%is_curved .or. .not. system%problem%fourier%has_constant()) then
+            call linear_solution(system, closed, .true., rest, x, tension)
+            return
+         end if
+         if (.not. allocated(rest%y)) call start_rest(system, law, rest)
+         do step = 1, most_steps
+            before = rest%y
+            call lean_on(system, law, rest)
+            call linear_solution(system, closed, .true., rest, x, tension)
+            call system%problem%incidence%gather(system%problem%joint%row(3, :), m, 1, x(:m), &
+                                                 opening)
+            rest%y = law%prediction%stiffness(:, 3)*(opening + law%prediction%gap + system%depth)
+            change = maxval(abs(rest%y - before), mask=closed)
+            if (change <= rest_tolerance*maxval(abs(rest%y), mask=closed)) exit
+         end do
+         call lean_on(system, law, rest)
+         call drop_unpressed(law, rest, tension)
+      end associate
+   end subroutine come_to_rest
+
+   !> Inputs at which curved pairs are as steep as the structure.
+   subroutine start_rest(system, law, rest)
+      type(balance_state), intent(in) :: system
+      class(force_law), intent(in) :: law
+      type(rest_type), intent(inout) :: rest
+      complex(wp), allocatable :: stiffness(:, :)
+      real(wp) :: wanted
+      integer :: i, j, m
+
+      m = system%problem%structure%n_coordinates
+      ! Of very many coordinates no matrix is formed; tangential springs are about as stiff.
+      wanted = maxval(law%prediction%stiffness(:, 1:2))
+      if (system%problem%fits_whole()) then
+         allocate (stiffness(m, m))
+         call system%problem%structure%block(system%structure_state, 1, stiffness)
+         wanted = max(wanted, maxval([(abs(stiffness(j, j)), j=1, m)]))
+      end if
+      rest%y = [(law%input_of_slope(i, wanted), i=1, system%problem%n_pairs)]
+      allocate (rest%slope, rest%gap, mold=rest%y)
+   end subroutine start_rest
+
+   !> Springs that press as the pairs do at their inputs.
+   subroutine lean_on(system, law, rest)
+      type(balance_state), intent(in) :: system
+      class(force_law), intent(in) :: law
+      type(rest_type), intent(inout) :: rest
+      real(wp) :: force, slope
+      integer :: i
+
+      do i = 1, size(rest%y)
+         call law%press_at(i, rest%y(i), force, slope)
+         rest%slope(i) = law%prediction%stiffness(i, 3)*slope
+         rest%gap(i) = law%prediction%gap(i) + system%depth(i)
+         if (rest%slope(i) > 0.0_wp) rest%gap(i) = rest%gap(i) + force/rest%slope(i) - &
+                                                   rest%y(i)/law%prediction%stiffness(i, 3)
+      end do
+   end subroutine lean_on
+
+   !> Pairs that do not press, or as good as not, count as under tension.
+   subroutine drop_unpressed(law, rest, tension)
+      class(force_law), intent(in) :: law
+      type(rest_type), intent(in) :: rest
+      real(wp), intent(inout) :: tension(:)
+      real(wp) :: force(size(tension)), slope
+      integer :: i
+
+      do i = 1, size(force)
+         call law%press_at(i, rest%y(i), force(i), slope)
+      end do
+      where (law%present(3, :) .and. force >= no_pressure*minval(force, mask=law%present(3, :))) &
+         tension = 1.0_wp
+   end subroutine drop_unpressed
 
    !> Whether the tension of open pairs is known, negative where they would bear: of elastic pairs,
    !> whose sectors differ (open ones of neighbours let each other close).
@@ -75,9 +178,10 @@ contains
       real(wp), intent(out), contiguous :: x(:)
       logical :: closed(system%problem%n_pairs)
       real(wp) :: tension(system%problem%n_pairs)
+      type(rest_type) :: rest
 
       closed = .false.
-      call linear_solution(system, closed, .false., x, tension)
+      call linear_solution(system, closed, .false., rest, x, tension)
    end subroutine free_guess
 
    !> Whether the structure, with every law but that of its contact, holds a static load where it
@@ -185,12 +289,14 @@ contains
    end function held_without_friction
 
    !> Solve with closed pairs stuck; tension is their mean normal force (positive: it pulls).
-   subroutine linear_solution(system, closed, at_rest, x, tension)
+   subroutine linear_solution(system, closed, at_rest, rest, x, tension)
       type(balance_state), intent(in) :: system
       !> Pairs that are taken for stuck (n_pairs).
       logical, intent(in) :: closed(:)
       !> Harmonic 0 alone; the others are zero.
       logical, intent(in) :: at_rest
+      !> Springs in the place of curved pairs.
+      type(rest_type), intent(in) :: rest
       real(wp), intent(out), contiguous :: x(:)
       !> Zero where there is no normal dof, and without a harmonic 0.
       real(wp), intent(out) :: tension(:)
@@ -199,7 +305,7 @@ contains
       logical :: ended, skipped
 
       if (system%problem%structure%n_alike > 1 .and. .not. system%problem%fits_whole()) then
-         call solve_sectors(system, closed, x, tension)
+         call solve_sectors(system, closed, rest, x, tension)
          return
       end if
       m = system%problem%structure%n_coordinates
@@ -210,15 +316,15 @@ contains
       if (m < coordinates_for_threads) then
          ! A region of one thread takes as long as a few harmonics of a small structure.
          do h = 1, last
-            if (.not. system%is_interrupted()) call solve_harmonic(system, closed, h, q(:, h), &
-                                                                   tension)
+            if (.not. system%is_interrupted()) call solve_harmonic(system, closed, h, rest, &
+                                                                   q(:, h), tension)
          end do
          call to_real_vector(system, q, x)
          return
       end if
       ended = .false.
       !$omp parallel do default(none) private(h, skipped) schedule(dynamic) &
-      !$omp shared(system, closed, q, tension, last, ended) if(last > 1)
+      !$omp shared(system, closed, rest, q, tension, last, ended) if(last > 1)
       do h = 1, last
          ! A harmonic of many pairs takes tenths of a second; nobody looks at the rest then. Only
          ! one thread asks: others may not call what listens for the end.
@@ -230,17 +336,18 @@ contains
             !$omp atomic read
             skipped = ended
          end if
-         if (.not. skipped) call solve_harmonic(system, closed, h, q(:, h), tension)
+         if (.not. skipped) call solve_harmonic(system, closed, h, rest, q(:, h), tension)
       end do
       !$omp end parallel do
       call to_real_vector(system, q, x)
    end subroutine linear_solution
 
    !> One harmonic of it, in a thread of its own.
-   subroutine solve_harmonic(system, closed, h, q, tension)
+   subroutine solve_harmonic(system, closed, h, rest, q, tension)
       type(balance_state), intent(in) :: system
       logical, intent(in) :: closed(:)
       integer, intent(in) :: h
+      type(rest_type), intent(in) :: rest
       complex(wp), intent(inout) :: q(:)
       !> Set by harmonic 0.
       real(wp), intent(inout) :: tension(:)
@@ -264,17 +371,17 @@ contains
       end if
       if (is_idle) then
          if (system%problem%fourier%harmonic(h) == 0) then
-            call find_tension(system, real(force, wp), q, tension)
+            call find_tension(system, rest, real(force, wp), q, tension)
          end if
          return
       end if
       allocate (stiffness(size(q), size(q)))
       call system%problem%structure%block(system%structure_state, h, stiffness)
-      call add_pairs(system, closed, h, stiffness, force)
+      call add_pairs(system, closed, h, rest, stiffness, force)
       call solve_free(stiffness, force, held, q)
       if (system%problem%fourier%harmonic(h) > 0) return
       ! Elastic pairs are in both.
-      call find_tension(system, [(real(force(j), wp) - real(sum(stiffness(j, :)*q), wp), &
+      call find_tension(system, rest, [(real(force(j), wp) - real(sum(stiffness(j, :)*q), wp), &
                                   j=1, size(q))], q, tension)
    end subroutine solve_harmonic
 
@@ -304,10 +411,11 @@ contains
    end subroutine hold_pairs
 
    !> Elastic pairs add their stiffness; none of their coordinates is held.
-   subroutine add_pairs(system, closed, h, stiffness, force)
+   subroutine add_pairs(system, closed, h, rest, stiffness, force)
       type(balance_state), intent(in) :: system
       logical, intent(in) :: closed(:)
       integer, intent(in) :: h
+      type(rest_type), intent(in) :: rest
       !> Of one harmonic: (n_coordinates, n_coordinates) and (n_coordinates).
       complex(wp), intent(inout) :: stiffness(:, :), force(:)
       integer :: i, c, row
@@ -320,9 +428,9 @@ contains
             do c = 1, 3
                row = system%problem%joint%row(c, i)
                if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
-               slope = elastic_slope(system, law, i, c, system%problem%fourier%harmonic(h))
+               slope = elastic_slope(system, law, i, c, system%problem%fourier%harmonic(h), rest)
                call system%problem%incidence%scatter_harmonic( &
-                  row, h, -slope*gap_of(system, h, i, c), force)
+                  row, h, -slope*gap_of(system, h, i, c, rest), force)
                call system%problem%incidence%add_block(row, h, slope, stiffness)
             end do
          end do
@@ -330,23 +438,36 @@ contains
    end subroutine add_pairs
 
    !> What a component of a pair has to close in a harmonic: its gap, in the static normal one.
-   pure real(wp) function gap_of(system, h, pair, component) result(gap)
+   pure real(wp) function gap_of(system, h, pair, component, rest) result(gap)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: h, pair, component
+      type(rest_type), intent(in), optional :: rest
 
       gap = 0.0_wp
       if (component /= 3 .or. system%problem%fourier%harmonic(h) /= 0) return
+      if (present(rest)) then
+         if (allocated(rest%gap)) then
+            gap = rest%gap(pair)
+            return
+         end if
+      end if
       gap = system%problem%forces%entry(system%problem%forces%pairs)%law%prediction%gap(pair) + &
             system%depth(pair)
    end function gap_of
 
    !> Force of an elastic pair about its position at rest over the amplitude of its displacement in
    !> a harmonic n: each derivative by tau is a factor i n.
-   complex(wp) function elastic_slope(system, law, pair, component, harmonic) result(slope)
+   complex(wp) function elastic_slope(system, law, pair, component, harmonic, rest) &
+      result(slope)
       type(balance_state), intent(in) :: system
       class(force_law), intent(in) :: law
       integer, intent(in) :: pair, component, harmonic
+      type(rest_type), intent(in) :: rest
 
+      if (component == 3 .and. allocated(rest%slope)) then
+         slope = cmplx(rest%slope(pair), kind=wp)
+         return
+      end if
       slope = cmplx(law%prediction%stiffness(pair, component)*law%slope_at_rest(pair, component), &
                     kind=wp)
       if (law%prediction%order_of(pair, component) > 0) then
@@ -383,8 +504,9 @@ contains
    end subroutine solve_free
 
    !> Mean normal force of every pair at a static position.
-   subroutine find_tension(system, left, q, tension)
+   subroutine find_tension(system, rest, left, q, tension)
       type(balance_state), intent(in) :: system
+      type(rest_type), intent(in) :: rest
       !> What is left of the balance, F_0 - Z_0 q less elastic forces (n_coordinates).
       real(wp), intent(in) :: left(:)
       !> Coordinates at rest (n_coordinates).
@@ -403,6 +525,8 @@ contains
             if (p%takes(i)) then
                ! What is left of the balance of a held row is the force that holds it.
                tension(i) = left(system%problem%incidence%coordinate_of(row))
+            else if (allocated(rest%slope)) then
+               tension(i) = rest%slope(i)*(opening(i) + rest%gap(i))
             else
                tension(i) = p%stiffness(i, 3)*(opening(i) + p%gap(i) + system%depth(i))
             end if

@@ -4,6 +4,8 @@
 !>   mu             dT = dT/d(mu p) p: T depends on mu y_n alone, so that dT = G_tn y_n/mu
 !>   normal load    dy_n = -1,     gap  dy_n = k_n    (constants, hence G of all harmonics)
 !>   k_t, k_n       dy = y/k
+!>   c, p_0         of curved normal laws, dy_n = -p/(p' c): the pressure is in proportion to them,
+!>                  and T to mu p, so that dy_n = -p/(p' mu) by mu
 !>   coefficient    the force of a unit coefficient
 !>   loads, matrices    dr = d(Z q - F)/dp, which laws that take the balance lose from their input.
 !>
@@ -19,8 +21,8 @@ module fw_parameter_slopes
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
-      is_of_matrices, is_per_pair, normal_load, normal_stiffness, parameter_group, &
-      spring_coefficient, static_scale, tangential_stiffness
+      is_of_matrices, is_per_pair, normal_coefficient, normal_load, normal_stiffness, &
+      parameter_group, reference_force, spring_coefficient, static_scale, tangential_stiffness
    use fw_recovery, only: observe
    implicit none (type, external)
    private
@@ -229,14 +231,20 @@ contains
       type(balance_state), intent(in) :: state
       type(parameter_entry), intent(in) :: parameter
       real(wp), intent(out) :: input(:, :)
+      character(24) :: pressing
       integer :: c, i
 
       input = 0.0_wp
       i = parameter%element
+      pressing = self%law%pressing_constant(i)
       associate (p => self%law%prediction, y => self%work%prediction, offset => self%work%offset)
          select case (parameter%number)
          case (friction_coefficient)
             if (.not. parameter%value > 0.0_wp) return
+            if (len_trim(pressing) > 0) then
+               call press_in_proportion(self, i, parameter%value, input(:, 3))
+               return
+            end if
             input(:, 3) = y(i, 3, :)/parameter%value
             input(1, 3) = input(1, 3) + offset(i)/parameter%value
          case (normal_load)
@@ -250,14 +258,33 @@ contains
                if (p%order_of(i, c) > 0) cycle
                call elongation(self, state, i, c, input(:, c))
             end do
+         case (normal_coefficient)
+            if (pressing == 'normal_coefficient') call press_in_proportion( &
+               self, i, parameter%value, input(:, 3))
+         case (reference_force)
+            if (pressing == 'reference_force') call press_in_proportion( &
+               self, i, parameter%value, input(:, 3))
          case (normal_stiffness)
-            if (p%takes(i)) return
+            if (p%takes(i) .or. len_trim(pressing) > 0) return
             call elongation(self, state, i, 3, input(:, 3))
             if (presses(state, i)) input(1, 3) = input(1, 3) + p%gap(i) + state%depth(i)
          case default ! acts through no input
          end select
       end associate
    end subroutine input_of
+
+   !> The change of a curved pair's normal input by which its pressure grows as with a factor of it.
+   subroutine press_in_proportion(self, pair, factor, input)
+      class(slope_finder), intent(in) :: self
+      integer, intent(in) :: pair
+      real(wp), intent(in) :: factor
+      real(wp), intent(out) :: input(:)
+
+      input = self%work%prediction(pair, 3, :)
+      input(1) = input(1) + self%work%offset(pair)
+      call self%law%input_of_pressure(pair, input)
+      input = input/factor
+   end subroutine press_in_proportion
 
    !> Whether a normal dof presses a pair.
    pure logical function presses(state, pair)

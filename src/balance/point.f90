@@ -6,7 +6,7 @@ module fw_point
    implicit none (type, external)
    private
 
-   public :: point_type, point_sensitivity, point_stress
+   public :: element_work, point_type, point_sensitivity, point_stress
    public :: served_words, served_by_none, served_by_newton, served_by_other_guess, &
              served_by_smaller_steps, served_by_raised_load, served_by_pseudo_time, &
              served_by_free_guess, served_by_powell, served_by_kinsol, served_by_arclength, &
@@ -24,6 +24,11 @@ module fw_point
                          served_by_raised_load = 5, served_by_free_guess = 6, &
                          served_by_powell = 7, served_by_kinsol = 8, served_by_arclength = 9, &
                          served_by_other_balance = 10, served_by_integration = 11
+
+   !> Work that elements of one kind take over a cycle (n_elements) [force * length].
+   type :: element_work
+      real(wp), allocatable :: values(:)
+   end type element_work
 
    !> Derivatives of one quantity by one parameter, or the deviation of the quantity.
    type :: point_sensitivity
@@ -96,6 +101,8 @@ module fw_point
       real(wp), allocatable :: fraction(:, :)
       !> Friction energy per cycle (n_pairs) [force * length].
       real(wp), allocatable :: dissipation(:)
+      !> The same of elements that are neither pairs nor springs, kind by kind.
+      type(element_work), allocatable :: work_of(:)
       !> Of a nonlinear mode: self-excitation [1/s], modal amplitude [length mass**(1/2)], and the
       !> amplitude of the first harmonic of what is observed, not allocated elsewhere (n_observed).
       real(wp) :: self_excitation = 0.0_wp, modal_amplitude = 0.0_wp

@@ -46,6 +46,7 @@ contains
       if (i > system%problem%fourier%n_time) point%instants_wanted = i
       if (with_contact .and. system%problem%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
+      if (with_contact) call find_element_work(system, point)
    end subroutine recover_point
 
    !> Observed quantities where the system stands, complex amplitudes (n_observed, n_retained).
@@ -192,6 +193,35 @@ contains
          end do
       end associate
    end subroutine dissipated_energy
+
+   !> Work of the elements that are neither pairs nor springs, whose inputs are displacements, where
+   !> the system was evaluated last.
+   subroutine find_element_work(system, point)
+      type(balance_state), intent(in) :: system
+      type(point_type), intent(inout) :: point
+      integer :: h, i, k, kind
+
+      if (.not. allocated(system%problem%forces%elements)) return
+      associate (kinds => system%problem%forces%elements, fourier => system%problem%fourier)
+         allocate (point%work_of(size(kinds)))
+         do kind = 1, size(kinds)
+            if (kinds(kind) == 0) cycle
+            associate (f => system%work(kinds(kind))%force, &
+                       u => system%work(kinds(kind))%prediction)
+               allocate (point%work_of(kind)%values(size(f, 1)), source=0.0_wp)
+               do h = 1, fourier%n_retained
+                  if (fourier%harmonic(h) == 0) cycle
+                  k = fourier%column(h)
+                  do i = 1, size(f, 1)
+                     point%work_of(kind)%values(i) = point%work_of(kind)%values(i) + &
+                        pi*fourier%harmonic(h)*sum(f(i, :, k)*u(i, :, k + 1) - &
+                                                   f(i, :, k + 1)*u(i, :, k))
+                  end do
+               end do
+            end associate
+         end do
+      end associate
+   end subroutine find_element_work
 
    !> One period of the observed quantities and of the contact forces and displacements.
    subroutine recover_histories(system, m, q, n_harmonics, point)

@@ -15,6 +15,8 @@
 !>   up to 3e-3 where friction switches between the steps.
 !> * A pair that sticks throughout could rest anywhere within its cone, a multiplier of exactly 1
 !>   that is left out.
+!> * Laws that act at once, smooth friction and curved pressures, are marched as well: slopes by
+!>   displacements and velocities at every instant.
 !> * Rigid contact (dlft, dlft_velocity) has no derivative in time: refused.
 module fw_stability
    use fw_error, only: error_type, fatal_error, status_input
@@ -74,7 +76,10 @@ contains
       if (allocated(error)) return
       call new_history(system, x, history, halved)
       n_harmonics = chosen_harmonics(system, basis)
-      marches = n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%problem%n_pairs)])
+      call check_static(system, basis, history, error)
+      if (allocated(error)) return
+      marches = n_harmonics == 0 .or. history%acts_at_once .or. &
+                any([(history%rubs(i), i=1, system%problem%n_pairs)])
       if (present(marched)) marched = marches
       if (marches) then
          call marched_multipliers(system, basis, history, multipliers, error)
@@ -97,8 +102,9 @@ contains
       if (system%problem%n_pairs > 0 .and. &
           .not. system%problem%forces%entry( &
              system%problem%forces%pairs)%law%facts%has_multipliers) then
-         call fatal_error(error, '&sweep stability needs law = ''penalty'' in &contact: forces '// &
-                          'of rigid contact are no function of the displacements', status_input)
+         call fatal_error(error, '&sweep stability needs law = ''penalty'' or '// &
+                          '''regularised'' in &contact: forces of rigid contact are no '// &
+                          'function of the displacements', status_input)
       else if (system%problem%joint%n_idle > 0) then
          call fatal_error(error, '&sweep stability: '//to_text(system%problem%joint%n_idle)// &
                           ' components of contact pairs that nothing moves were left out, but '// &
@@ -109,6 +115,34 @@ contains
                           'stability off', status_input)
       end if
    end subroutine check_system
+
+   !> A direction without mass and damping that a pair of velocities rubs on is a state of its own,
+   !> which the march has not.
+   subroutine check_static(system, basis, history, error)
+      class(balance_state), intent(in) :: system
+      type(perturbation_basis), intent(in) :: basis
+      type(history_type), intent(in) :: history
+      type(error_type), allocatable, intent(out) :: error
+      !> Part of a row that round-off leaves.
+      real(wp), parameter :: negligible = 1.0e-9_wp
+      integer :: c, i, row
+
+      if (.not. history%acts_at_once) return
+      associate (nd => basis%n_massive + basis%n_damped)
+         do i = 1, system%problem%n_pairs
+            do c = 1, 2
+               row = system%problem%joint%row(c, i)
+               if (row == 0 .or. history%law%prediction%order_of(i, c) == 0) cycle
+               if (norm2(basis%direction(nd + 1:, row)) <= &
+                   negligible*norm2(basis%direction(:, row))) cycle
+               call fatal_error(error, '&sweep stability: pair '//to_text(i)//' rubs, by a law '// &
+                                'of velocities, on a dof without mass and damping; give it '// &
+                                'either, or switch stability off', status_input)
+               return
+            end do
+         end do
+      end associate
+   end subroutine check_static
 
    !> Harmonics for Hill's method: those of the solution, and more where the eigenproblem stays
    !> small; 0 where it would be too large.

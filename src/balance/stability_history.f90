@@ -3,7 +3,7 @@
 module fw_stability_history
    use fw_force_law, only: force_law, force_workspace, pair_mixed, pair_stuck
    use fw_fourier, only: fourier_type, new_fourier
-   use fw_friction, only: elastic_friction, friction_law
+   use fw_friction, only: elastic_friction
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
@@ -27,8 +27,12 @@ module fw_stability_history
       !> Tangential rows of pairs that slip, which remember their position (n_rows).
       logical, allocatable :: remembers(:)
       !> Pairs along the period.
-      type(friction_law) :: law
+      class(pair_law), allocatable :: law
       type(force_workspace) :: forces
+      !> Of a law that acts at once: slopes of its forces by displacements and by velocities
+      !> (output, input, n_pairs, n_time).
+      logical :: acts_at_once = .false.
+      real(wp), allocatable :: by_displacement(:, :, :, :), by_velocity(:, :, :, :)
       !> Slopes of the other elements (as pointwise_row, n_time).
       real(wp), allocatable :: slope(:, :)
    contains
@@ -72,6 +76,11 @@ contains
       end associate
       ! The march of the pairs starts where that of the balance did, and so comes to the same
       ! limit.
+      if (self%law%facts%acts_at_once) then
+         call differentiate_at_once(system, rows, fourier, self)
+         call take_slopes(system, rows, fourier, self)
+         return
+      end if
       self%forces%x_start = system%work(system%problem%forces%pairs)%x_start
       call self%law%set_offset(system%depth, self%forces)
       call self%law%evaluate(fourier, self%forces)
@@ -83,15 +92,66 @@ contains
    !> The pairs of a law, decided at instants whatever the balance does.
    subroutine take_law(law, at_instants)
       class(force_law), intent(in) :: law
-      type(friction_law), intent(out) :: at_instants
+      class(pair_law), allocatable, intent(out) :: at_instants
 
-      at_instants = elastic_friction()
       select type (law)
       class is (pair_law)
+         if (law%facts%acts_at_once) then
+            allocate (at_instants, source=law)
+            return
+         end if
+         allocate (at_instants, source=elastic_friction())
          call at_instants%take_pairs(law%mu, law%present)
       end select
       at_instants%prediction = law%prediction
    end subroutine take_law
+
+   !> Slopes of forces that follow from displacement and velocity at the same instant.
+   subroutine differentiate_at_once(system, rows, fourier, self)
+      class(balance_state), intent(in) :: system
+      !> Coefficients of the relative displacements (2H+1, n_rows).
+      real(wp), intent(in) :: rows(:, :)
+      type(fourier_type), intent(in) :: fourier
+      type(history_type), intent(inout) :: self
+      real(wp) :: u(self%n_time, size(rows, 2)), v(self%n_time, size(rows, 2))
+      real(wp) :: rates(size(rows, 1), size(rows, 2))
+      real(wp) :: here(3), moves(3), force(3), slope(3, 3)
+      integer :: c, i, k, n
+
+      self%acts_at_once = .true.
+      rates = 0.0_wp
+      do n = 1, (size(rows, 1) - 1)/2
+         rates(2*n, :) = n*system%frequency()*rows(2*n + 1, :)
+         rates(2*n + 1, :) = -n*system%frequency()*rows(2*n, :)
+      end do
+      u = matmul(transpose(fourier%synthesis), rows)
+      v = matmul(transpose(fourier%synthesis), rates)
+      n = size(self%row, 2)
+      allocate (self%by_displacement(3, 3, n, self%n_time), source=0.0_wp)
+      allocate (self%by_velocity, source=self%by_displacement)
+      associate (p => self%law%prediction)
+         do k = 1, self%n_time
+            do i = 1, n
+               here = 0.0_wp
+               moves = 0.0_wp
+               do c = 1, 3
+                  if (self%row(c, i) == 0) cycle
+                  here(c) = u(k, self%row(c, i))
+                  moves(c) = v(k, self%row(c, i))
+               end do
+               call self%law%at_instant(i, self%law%input_at(i, here, moves, system%depth(i)), &
+                                        force, slope)
+               do c = 1, 3
+                  if (p%order_of(i, c) > 0) then
+                     self%by_velocity(:, c, i, k) = slope(c, :)*p%stiffness(i, c)
+                  else
+                     self%by_displacement(:, c, i, k) = slope(c, :)*p%stiffness(i, c)
+                  end if
+               end do
+            end do
+         end do
+      end associate
+   end subroutine differentiate_at_once
 
    !> Slopes of the laws other than that of the pairs.
    subroutine take_slopes(system, rows, fourier, self)
@@ -167,26 +227,33 @@ contains
       class(history_type), intent(in) :: self
       integer, intent(in) :: pair
 
-      rubs = self%law%mu(pair) > 0.0_wp .and. any(self%row(1:2, pair) > 0) .and. &
+      rubs = .not. self%acts_at_once .and. self%law%mu(pair) > 0.0_wp .and. &
+             any(self%row(1:2, pair) > 0) .and. &
              self%forces%state(pair) == pair_mixed
    end function rubs
 
-   !> d force = by_u d u_r + by_x d x at an instant, and which rows keep their position there.
-   pure subroutine derivatives(self, k, by_u, by_x, keeps)
+   !> d force = by_u d u_r + by_v d v_r + by_x d x at an instant, and which rows keep their position
+   !> there.
+   pure subroutine derivatives(self, k, by_u, by_v, by_x, keeps)
       class(history_type), intent(in) :: self
       integer, intent(in) :: k
-      !> (output row, input row) [force/length] and [1].
-      real(wp), intent(out) :: by_u(:, :), by_x(:, :)
+      !> (output row, input row) [force/length], [force time/length] and [1].
+      real(wp), intent(out) :: by_u(:, :), by_v(:, :), by_x(:, :)
       logical, intent(out) :: keeps(:)
       real(wp) :: d(2), p, length
       integer :: i, before
 
       by_u = 0.0_wp
+      by_v = 0.0_wp
       by_x = 0.0_wp
       keeps = .false.
       do i = 1, size(self%pointwise_row)
          by_u(self%pointwise_row(i), self%pointwise_row(i)) = self%slope(i, k)
       end do
+      if (self%acts_at_once) then
+         call take_at_once(self, k, by_u, by_v)
+         return
+      end if
       before = modulo(k - 2, self%n_time) + 1
       do i = 1, size(self%row, 2)
          p = -self%forces%prediction_time(i, 3, k)
@@ -207,6 +274,26 @@ contains
          end if
       end do
    end subroutine derivatives
+
+   !> By the rows of the joint.
+   pure subroutine take_at_once(self, k, by_u, by_v)
+      class(history_type), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(inout) :: by_u(:, :), by_v(:, :)
+      integer :: b, c, i
+
+      do i = 1, size(self%row, 2)
+         do b = 1, 3
+            do c = 1, 3
+               associate (out => self%row(c, i), in => self%row(b, i))
+                  if (out == 0 .or. in == 0) cycle
+                  by_u(out, in) = self%by_displacement(c, b, i, k)
+                  by_v(out, in) = self%by_velocity(c, b, i, k)
+               end associate
+            end do
+         end do
+      end do
+   end subroutine take_at_once
 
    !> df = k du - dx, with x in units of force.
    pure subroutine stick(self, pair, by_u, by_x, keeps)

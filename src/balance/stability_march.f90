@@ -8,6 +8,8 @@
 !>   slip   df = mu p/|d| (I - e e^T)(dy - dx) - mu e dy_n,  dx = dy - df
 !>   open   df = 0,                                          dx = dy.
 !>
+!> Laws that act at once have no positions: df = df/du du + df/dv dv.
+!>
 !> Time steps follow Newmark's rule of constant mean acceleration (error h**2, no numerical
 !> damping), with backward Euler for massless damped directions: there the mean rule would ring.
 module fw_stability_march
@@ -33,10 +35,12 @@ module fw_stability_march
       !> Constant part of the matrix of a step (n, n).
       real(wp), allocatable :: fixed(:, :)
       !> Derivatives of the forces at the present instant, see history_type.
-      real(wp), allocatable :: by_u(:, :), by_x(:, :)
+      real(wp), allocatable :: by_u(:, :), by_v(:, :), by_x(:, :)
       logical, allocatable :: keeps(:)
-      !> by_u of the factors in lu.
-      real(wp), allocatable :: factored(:, :)
+      !> by_u and by_v of the factors in lu.
+      real(wp), allocatable :: factored(:, :), factored_v(:, :)
+      !> Rates of the coordinates at the end of a step over their change in it (n).
+      real(wp), allocatable :: per_step(:)
       type(lu_type) :: lu
    end type march_type
 
@@ -61,8 +65,8 @@ contains
       ! From instant 1 through the others, and back to it: derivatives are those at the end of a
       ! step.
       do k = 1, history%n_time
-         call history%derivatives(modulo(k, history%n_time) + 1, march%by_u, march%by_x, &
-                                  march%keeps)
+         call history%derivatives(modulo(k, history%n_time) + 1, march%by_u, march%by_v, &
+                                  march%by_x, march%keeps)
          call advance(basis, history, march, error)
          if (allocated(error)) return
       end do
@@ -94,7 +98,9 @@ contains
       n_columns = nd + nb + size(memory)
       self%step = 2.0_wp*pi/(system%frequency()*history%n_time)
       allocate (self%y(n, n_columns), self%v(nb, n_columns), self%a(nb, n_columns), source=0.0_wp)
-      allocate (self%x(nr, n_columns), self%by_u(nr, nr), self%by_x(nr, nr), source=0.0_wp)
+      allocate (self%x(nr, n_columns), self%by_u(nr, nr), self%by_v(nr, nr), &
+                self%by_x(nr, nr), source=0.0_wp)
+      self%per_step = [(merge(2.0_wp, 1.0_wp, j <= nb)/self%step, j=1, n)]
       allocate (self%keeps(nr))
       do j = 1, nd
          self%y(j, j) = 1.0_wp
@@ -115,7 +121,7 @@ contains
       do j = nb + 1, nd
          self%fixed(j, j) = self%fixed(j, j) + 1.0_wp/self%step
       end do
-      call history%derivatives(1, self%by_u, self%by_x, self%keeps)
+      call history%derivatives(1, self%by_u, self%by_v, self%by_x, self%keeps)
       call settle(basis, history, self, error)
    end subroutine start
 
@@ -161,6 +167,9 @@ contains
          deallocate (self%lu%matrix, self%lu%pivot)
       end if
       self%a = -force(:nb, :) - matmul(basis%damping(:nb, :nb), self%v)
+      if (history%acts_at_once) self%a = self%a - &
+         matmul(basis%direction(:nb, :), matmul(self%by_v, matmul( &
+                transpose(basis%direction(:nb, :)), self%v)))
    end subroutine settle
 
    !> A static direction without stiffness: its position is anything.
@@ -196,6 +205,7 @@ contains
                        matmul(basis%damping(:nb, :nb), 2.0_wp/h*y + v)
          ! Backward Euler: (y1 - y)/h + K y1 + f1 = 0.
          rhs(nb + 1:nd, :) = rhs(nb + 1:nd, :) + self%y(nb + 1:nd, :)/h
+         if (history%acts_at_once) call add_rates(basis, self, rhs)
          call dgetrs('N', basis%n, size(rhs, 2), self%lu%matrix, basis%n, self%lu%pivot, rhs, &
                      basis%n, info)
          ! a before v: it needs the velocity at the begin of the step.
@@ -212,6 +222,22 @@ contains
       end do
    end subroutine advance
 
+   !> Forces of the velocities at the end of a step, of the part that its start decides.
+   subroutine add_rates(basis, self, rhs)
+      type(perturbation_basis), intent(in) :: basis
+      type(march_type), intent(in) :: self
+      real(wp), intent(inout) :: rhs(:, :)
+      real(wp) :: rates(size(rhs, 1), size(rhs, 2))
+      integer :: j
+
+      do j = 1, size(rhs, 1)
+         rates(j, :) = self%per_step(j)*self%y(j, :)
+         if (j <= basis%n_massive) rates(j, :) = rates(j, :) + self%v(j, :)
+      end do
+      rhs = rhs + matmul(basis%direction, matmul(self%by_v, &
+                                                 matmul(transpose(basis%direction), rates)))
+   end subroutine add_rates
+
    !> Factor the matrix of a step where the laws differ from those of the factors at hand.
    subroutine factor(basis, self, singular)
       type(perturbation_basis), intent(in) :: basis
@@ -222,12 +248,19 @@ contains
       if (allocated(self%factored)) then
          ! Long stretches of stick have the same derivative at every instant: one factorization
          ! serves.
-         if (all(abs(self%by_u - self%factored) <= 0.0_wp)) return
+         if (all(abs(self%by_u - self%factored) <= 0.0_wp) .and. &
+             all(abs(self%by_v - self%factored_v) <= 0.0_wp)) return
       end if
       self%factored = self%by_u
+      self%factored_v = self%by_v
       call self%lu%reserve(basis%n)
       self%lu%matrix = self%fixed + matmul(basis%direction, &
                                            matmul(self%by_u, transpose(basis%direction)))
+      if (any(abs(self%by_v) > 0.0_wp)) then
+         self%lu%matrix = self%lu%matrix + &
+            matmul(basis%direction, matmul(self%by_v, transpose(basis%direction)))* &
+            spread(self%per_step, 1, basis%n)
+      end if
       call self%lu%factor(singular)
    end subroutine factor
 

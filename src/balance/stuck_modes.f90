@@ -90,7 +90,7 @@ contains
       integer, intent(in) :: first
       complex(wp), intent(inout) :: block(:, :)
       logical, intent(inout) :: held(:)
-      real(wp) :: slope
+      real(wp) :: force, slope
       integer :: c, i, k, row
 
       do k = 1, system%problem%forces%n_laws
@@ -107,6 +107,10 @@ contains
                if (row == 0 .or. work%state(i) == pair_open) cycle
                ! Stuck, whatever slipped on the way to rest.
                slope = entry%law%slope_at_rest(i, c)
+               if (c == 3 .and. entry%law%facts%is_curved) then
+                  call entry%law%press_at(i, work%prediction(i, 3, 1) + work%offset(i), force, &
+                                          slope)
+               end if
                if (.not. abs(slope) > 0.0_wp) cycle
                if (entry%law%prediction%takes(i)) then
                   held(system%problem%incidence%coordinate_of(row)) = .true.

@@ -83,14 +83,14 @@ contains
          if (system%is_interrupted()) exit
          force = system%structure_state%load(:, h)
          if (system%problem%fourier%harmonic(h) > 0) force = system%load_share*force
-         call close_sectors(system, closed, h, slope, force, held, q(:, h))
+         call close_sectors(system, closed, h, rest, slope, force, held, q(:, h))
          call wave_solution(system, h, slope, force, held, q(:, h))
       end do
       call to_real(system%problem%fourier, m, q, x)
       if (.not. system%problem%fourier%has_constant()) return
       allocate (product(m))
       call static_product(system, q(:, 1), product)
-      call find_tension(system, system%load(:, 1) - product, q(:, 1), tension)
+      call find_tension(system, rest, system%load(:, 1) - product, q(:, 1), tension)
    end procedure solve_sectors
 
    !> Z_0 q.
@@ -121,10 +121,11 @@ contains
    end subroutine static_product
 
    !> What closed pairs add to the rows of a sector, and which coordinates of it they hold.
-   subroutine close_sectors(system, closed, h, slope, force, held, q)
+   subroutine close_sectors(system, closed, h, rest, slope, force, held, q)
       type(balance_state), intent(in) :: system
       logical, intent(in) :: closed(:)
       integer, intent(in) :: h
+      type(rest_type), intent(in) :: rest
       !> Mean over the sectors (rows of a sector).
       complex(wp), allocatable, intent(out) :: slope(:)
       complex(wp), intent(inout) :: force(:), q(:)
@@ -142,17 +143,15 @@ contains
             do c = 1, 3
                row = system%problem%joint%row(c, i)
                if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
-               gap = 0.0_wp
-               if (c == 3 .and. system%problem%fourier%harmonic(h) == 0) then
-                  gap = law%prediction%gap(i) + system%depth(i)
-               end if
+               gap = gap_of(system, h, i, c, rest)
                if (law%prediction%takes(i)) then
                   j = system%problem%incidence%coordinate_of(row)
                   n_held(system%problem%structure%slot(j)) = &
                      n_held(system%problem%structure%slot(j)) + 1
                   q(j) = -gap
                else
-                  own = elastic_slope(system, law, i, c, system%problem%fourier%harmonic(h))
+                  own = elastic_slope(system, law, i, c, system%problem%fourier%harmonic(h), &
+                                      rest)
                   call system%problem%incidence%scatter_harmonic(row, h, -own*gap, force)
                   j = system%problem%joint%row_in_sector(row)
                   slope(j) = slope(j) + own/n

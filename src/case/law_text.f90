@@ -2,11 +2,12 @@
 module fw_law_text
    use fw_contact_data, only: contact_type
    use fw_laws, only: law_words, laws_of
+   use fw_normal_law, only: normal_words
    use fw_text, only: string_type
    implicit none (type, external)
    private
 
-   public :: all_laws, law_of_pairs, law_text, law_text_length
+   public :: all_laws, law_of_pairs, normal_law_of_pairs, law_text, law_text_length
 
    !> Of all words, each in quotes, with a comma between.
    integer, parameter :: law_text_length = size(law_words)*(len(law_words) + 4)
@@ -49,5 +50,17 @@ contains
          words(i)%text = trim(law_words(contact%law_of(i)))
       end do
    end subroutine law_of_pairs
+
+   !> How each pair presses, of a contact that says so (n_pairs).
+   pure subroutine normal_law_of_pairs(contact, words)
+      type(contact_type), intent(in) :: contact
+      type(string_type), allocatable, intent(out) :: words(:)
+      integer :: i
+
+      allocate (words(contact%n_pairs))
+      do i = 1, size(words)
+         words(i)%text = trim(normal_words(contact%normal_law(i)))
+      end do
+   end subroutine normal_law_of_pairs
 
 end module fw_law_text

@@ -8,6 +8,7 @@ module fw_raw_model
    use fw_law_text, only: all_laws
    use fw_laws, only: law_words
    use fw_stress_parts, only: stress_parts
+   use fw_normal_law, only: normal_words
    use fw_part_keys, only: part_keys
    use fw_part, only: by_columns, either_way, part, part_source, part_type
    use fw_text, only: string_type, to_text
@@ -137,6 +138,7 @@ contains
       laws = part('contact/law', 'pair', 'in its place the law of each pair')
       call to%bind(laws, words)
       if (allocated(words)) call take_laws(laws, words, to, pairs)
+      call bind_normal_laws(pairs, to)
       call to%bind(part('contact/position', 'pair 3', 'coordinates, for pictures', &
                         storage=by_columns), pairs%position)
       call to%bind(part('contact/patch', 'pair', 'name of the surface of each pair'), pairs%patch)
@@ -162,6 +164,36 @@ contains
       pairs%law_is_of_model = .true.
       if (any(numbers /= numbers(1))) pairs%law_of = numbers
    end subroutine take_laws
+
+   !> How pairs press, and the table of those that have one.
+   subroutine bind_normal_laws(pairs, to)
+      type(contact_type), intent(inout) :: pairs
+      class(part_source), intent(inout) :: to
+      real(wp), allocatable :: table(:, :)
+      type(string_type), allocatable :: words(:)
+      type(part_type) :: laws
+      integer :: i
+
+      call to%note('text', part('contact@normal_law', '', 'the normal law of all pairs'))
+      laws = part('contact/normal_law', 'pair', 'in its place that of each pair')
+      call to%bind(laws, words)
+      if (allocated(words)) then
+         allocate (pairs%normal_law(size(words)), source=0)
+         do i = 1, size(words)
+            pairs%normal_law(i) = findloc(normal_words == words(i)%text, .true., dim=1)
+            if (pairs%normal_law(i) > 0) cycle
+            call to%refuse(laws, '"'//words(i)%text//'"', "'unilateral', 'power', "// &
+                           "'exponential', 'table'")
+            return
+         end do
+      end if
+      call to%bind(part('contact/table', 'row 2', "overclosure and force of normal_law = "// &
+                        "'table'"), table)
+      if (.not. allocated(table)) return
+      pairs%n_table = size(table, 1)
+      pairs%overclosure = table(:, 1)
+      pairs%table_force = table(:, 2)
+   end subroutine bind_normal_laws
 
    subroutine bind_springs(springs, to)
       type(spring_type), intent(inout) :: springs

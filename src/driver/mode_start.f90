@@ -400,12 +400,19 @@ contains
    !> Static loads, and what interferences would press with [force].
    real(wp) function static_size(balance) result(force)
       type(balance_state), intent(in) :: balance
+      real(wp) :: pressing(size(balance%depth)), slope
+      integer :: i
 
       force = 0.0_wp
       if (.not. balance%problem%fourier%has_constant()) return
       force = norm2(balance%load(:, 1))
-      associate (p => balance%problem%forces%entry(balance%problem%forces%pairs)%law%prediction)
-         if (size(balance%depth) > 0) force = force + norm2(p%stiffness(:, 3)*min(p%gap, 0.0_wp))
+      associate (law => balance%problem%forces%entry(balance%problem%forces%pairs)%law)
+         if (size(balance%depth) == 0) return
+         do i = 1, size(pressing)
+            call law%press_at(i, law%prediction%stiffness(i, 3)*min(law%prediction%gap(i), &
+                                                                    0.0_wp), pressing(i), slope)
+         end do
+         force = force + norm2(pressing)
       end associate
    end function static_size
 

@@ -31,6 +31,8 @@ contains
       associate (problem => system%balance%problem)
          done = problem%forces%n_laws == 1 .and. problem%fourier%has_constant() .and. &
                 all(mu > 0.0_wp) .and. amplitude > 0.0_wp
+         ! Forces of the motion are in proportion to it where pressures are.
+         if (done) done = .not. problem%forces%entry(problem%forces%pairs)%law%facts%is_curved
          if (.not. done) return
          call evaluate_motion(system, amplitude, y)
          done = all(system%balance%work(problem%forces%pairs)%state /= pair_open)

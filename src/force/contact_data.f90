@@ -43,6 +43,14 @@ module fw_contact_data
       real(wp), allocatable :: normal_load(:)
       !> Stiffnesses of elastic pairs [force/length] (n_pairs).
       real(wp), allocatable :: tangential_stiffness(:), normal_stiffness(:)
+      !> How each pair presses, a number in `normal_words` (fw_normal_law) (n_pairs); unilateral
+      !> springs where it is not allocated.
+      integer, allocatable :: normal_law(:)
+      !> Table of pressures, one for all pairs that have one (n_table) [length], [force].
+      integer :: n_table = 0
+      real(wp), allocatable :: overclosure(:), table_force(:)
+      !> Whether constants of curved normal laws are pressures, to be multiplied by the area.
+      logical :: normal_per_area = .false.
       !> What else a law takes of the pairs.
       type(law_constants) :: constants
       !> Multiplies the automatic penalty of the DLFT laws.

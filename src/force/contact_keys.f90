@@ -10,12 +10,14 @@ module fw_contact_keys
    use fw_key_range, only: above, at_least, dof_numbers, from_to
    use fw_kinds, only: wp
    use fw_laws, only: law_help, law_words, laws_of, new_law, pairs_of_law
+   use fw_normal_law, only: normal_words, table, unilateral
    use fw_pair_law, only: pair_law
    implicit none (type, external)
    private
 
-   public :: ask_laws, bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
-             bind_normal_load, bind_laws, bind_march, bind_worn, bind_n_springs, bind_springs
+   public :: ask_laws, bind_pairs, bind_law, bind_normal_law, bind_table, bind_sides, &
+             bind_friction, bind_gap, bind_normal_load, bind_laws, bind_march, bind_worn, &
+             bind_n_springs, bind_springs
 
    !> More pairs or springs are taken for a mistake.
    integer, parameter :: most = 1000000
@@ -52,6 +54,54 @@ contains
       if (any(numbers /= numbers(1))) contact%law_of = numbers
    end subroutine bind_law
 
+   !> How all pairs press, or each, by words of fw_normal_law.
+   subroutine bind_normal_law(keys, contact)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      integer, allocatable :: numbers(:)
+
+      numbers = [unilateral]
+      if (allocated(contact%normal_law)) numbers = contact%normal_law
+      if (size(numbers) == 0) numbers = [unilateral]
+      call keys%bind_words(key('normal_law', 'how pairs with a normal dof press: a spring, '// &
+                               'normal_coefficient d**normal_exponent, reference_force '// &
+                               'exp(d/decay_length), a table', shape='n_pairs', &
+                               only="law = 'penalty', 'regularised'"), numbers, normal_words)
+      if (allocated(contact%normal_law)) deallocate (contact%normal_law)
+      if (all(numbers == unilateral)) return
+      if (size(numbers) /= contact%n_pairs) numbers = spread(numbers(1), 1, contact%n_pairs)
+      contact%normal_law = numbers
+   end subroutine bind_normal_law
+
+   !> The table of those that have one, and whether what they take is of an area.
+   subroutine bind_table(keys, contact)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      character(*), parameter :: with_table = "normal_law = 'table'"
+      logical :: needed
+
+      call keys%bind(key('n_table', 'points of the table', from_to(0, most), absent=of_file, &
+                         only=with_table), contact%n_table)
+      call keys%set_size('n_table', contact%n_table)
+      if (allocated(contact%overclosure)) then
+         if (size(contact%overclosure) /= contact%n_table) deallocate (contact%overclosure, &
+                                                                       contact%table_force)
+      end if
+      needed = .false.
+      if (allocated(contact%normal_law)) needed = any(contact%normal_law == table) .and. &
+         contact%n_table > 0 .and. .not. allocated(contact%overclosure)
+      call keys%bind(key('overclosure', 'of the points, in ascending order', unit='L', &
+                         shape='n_table', repeats=.false., absent=of_file//', else required', &
+                         only=with_table), contact%overclosure, needed)
+      call keys%bind(key('force', 'of the points, from 0 up: linear between them, beyond the '// &
+                         'last with its slope', at_least(0.0_wp), 'F', 'n_table', &
+                         repeats=.false., absent=of_file//', else required', only=with_table), &
+                     contact%table_force, needed)
+      call keys%bind(key('normal_per_area', 'normal_coefficient, reference_force and force are '// &
+                         'pressures: times area', only="normal_law other than 'unilateral'"), &
+                     contact%normal_per_area)
+   end subroutine bind_table
+
    !> Dofs of both sides; a pair between one side and the ground has no side 2.
    subroutine bind_sides(keys, contact, needed)
       class(key_visitor), intent(inout) :: keys
@@ -82,7 +132,8 @@ contains
                      needed)
    end subroutine bind_friction
 
-   !> Gap and area; the area turns forces into pressures, which wear alone asks for.
+   !> Gap and area; the area turns forces into pressures, which wear asks for, and normal laws
+   !> whose constants are pressures.
    subroutine bind_gap(keys, contact, needs_area)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -91,8 +142,8 @@ contains
       call keys%bind(key('gap', 'initial gap; negative: interference, which preloads', &
                          unit='L', shape='n_pairs', absent=of_file), contact%gap, default=0.0_wp)
       call keys%bind(key('area', 'of a pair: from contact forces to pressure', above(0.0_wp), &
-                         'L^2', 'n_pairs', absent='of the file, else required for wear', &
-                         only="analysis = 'wear'"), contact%area, needs_area)
+                         'L^2', 'n_pairs', absent='of the file, else required for wear, per area', &
+                         only="analysis = 'wear', normal_per_area"), contact%area, needs_area)
    end subroutine bind_gap
 
    !> A constant force in the place of the normal dof that a pair does not have.

@@ -1,6 +1,7 @@
 !> All groups of elements that are neither pairs nor springs: the kinds that there are, and those
 !> of a case.
 module fw_elements
+   use fw_damper_group, only: damper_group
    use fw_element_group, only: element_group, group_name_length
    use fw_kinds, only: wp
    use fw_polynomial_group, only: polynomial_group
@@ -10,7 +11,7 @@ module fw_elements
    public :: element_list, element_kind, element_slot, n_element_kinds
 
    !> A new kind is a line in `new_group`, and one more here.
-   integer, parameter :: n_element_kinds = 1
+   integer, parameter :: n_element_kinds = 2
 
    type :: element_slot
       class(element_group), allocatable :: group
@@ -38,6 +39,7 @@ contains
 
       select case (kind)
       case (1); allocate (polynomial_group :: group)
+      case (2); allocate (damper_group :: group)
       case default ! no such kind
       end select
    end subroutine new_group

@@ -97,11 +97,17 @@ module fw_force_law
       !> Its forces are known in every harmonic (`tail`), where a pair has one tangential direction.
       logical :: has_tail = .false.
       !> A perturbation can be followed through the period: Floquet multipliers. With pairs that
-      !> is done for Coulomb's law behind springs alone (`src/balance/stability_history.f90`): any
-      !> other law of pairs would get the multipliers of that one.
+      !> is done for Coulomb's law behind springs, and for laws that act at once
+      !> (`src/balance/stability_history.f90`): any other would get the multipliers of the first.
       logical :: has_multipliers = .false.
-      !> The integration in time (`src/time`) knows the law: Coulomb's, rigid or behind springs.
+      !> The integration in time (`src/time`) knows the law: Coulomb's, rigid or behind springs, or
+      !> one that acts at once.
       logical :: is_integrated = .false.
+      !> Forces at an instant follow from the inputs at the same instant alone: `at_instant` of
+      !> fw_pair_law gives them, with their slopes.
+      logical :: acts_at_once = .false.
+      !> How hard elements press is no straight line of their normal input.
+      logical :: is_curved = .false.
       !> Instants below which the sampling error exceeds that of the truncation: in all, for each
       !> harmonic, and for each harmonic where elements may separate or the normal load varies.
       !> (The defaults are those of friction.)
@@ -122,6 +128,9 @@ module fw_force_law
       real(wp), allocatable :: prediction(:, :, :), force(:, :, :)
       !> The same at the instants; forces only after `sample` where events are followed.
       real(wp), allocatable :: prediction_time(:, :, :), force_time(:, :, :)
+      !> Of elements that press along a curve, whose normal input at the instants is minus the
+      !> pressure: its slope by the input (n_elements, n_time).
+      real(wp), allocatable :: pressing(:, :)
       !> Constant part of the input of the last component: stiffness times gap with the wear depth,
       !> or minus the dead load (n_elements).
       real(wp), allocatable :: offset(:)
@@ -203,6 +212,10 @@ module fw_force_law
       procedure :: fractions
       procedure :: slope_at_rest
       procedure :: slope_at
+      procedure :: press_at
+      procedure :: input_of_slope
+      procedure :: input_of_pressure
+      procedure :: pressing_constant
       procedure :: slopes_about
       procedure :: n_parameters
       procedure :: find_parameter
@@ -499,6 +512,55 @@ contains
       associate (unused => self, unused_element => element, unused_input => y)
       end associate
    end function slope_at
+
+   !> Normal force of an element at a mean input, and its slope there, where both follow from the
+   !> input alone: those of a spring that bears.
+   pure subroutine press_at(self, element, y, force, slope)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y
+      real(wp), intent(out) :: force, slope
+
+      force = y
+      slope = 1.0_wp
+      associate (unused => self, unused_element => element)
+      end associate
+   end subroutine press_at
+
+   !> A normal input at which an element is about as steep as a stiffness that is given.
+   pure real(wp) function input_of_slope(self, element, wanted) result(y)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: wanted
+
+      y = 0.0_wp
+      associate (unused => self, unused_element => element, unused_slope => wanted)
+      end associate
+   end function input_of_slope
+
+   !> From coefficients of the normal input of an element to those of the change of it that raises
+   !> the pressure in proportion: the input itself, as a pressure is proportional to it.
+   pure subroutine input_of_pressure(self, element, y)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      !> (n_coefficients), the constant first.
+      real(wp), intent(inout) :: y(:)
+
+      associate (unused => self, unused_element => element, unused_input => y)
+      end associate
+   end subroutine input_of_pressure
+
+   !> The constant that the pressure of an element is in proportion to, by its key, where its normal
+   !> input is the relative displacement itself; blank where a stiffness makes the input of that.
+   pure function pressing_constant(self, element) result(name)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      character(24) :: name
+
+      name = ''
+      associate (unused => self, unused_element => element)
+      end associate
+   end function pressing_constant
 
    !> Slopes of the forces of an element about a position at rest y (component): (output, input).
    subroutine slopes_about(self, element, y, slope)

@@ -13,6 +13,7 @@ module fw_friction
    use fw_friction_events, only: follow_events
    use fw_key, only: key_visitor
    use fw_kinds, only: wp
+   use fw_normal_law, only: bind_normal_constants, curved_pairs
    use fw_pair_law, only: normal_stiffness_key, pair_law, tangential_stiffness_key
    use fw_sampled_turn, only: settle_samples
    use fw_settling, only: periodic_tolerance, shakedown_turns
@@ -39,6 +40,7 @@ module fw_friction
    contains
       procedure :: bind_keys
       procedure :: take_constants
+      procedure :: take_facts
       procedure :: reserve
       procedure :: evaluate
       procedure :: linearize
@@ -113,6 +115,7 @@ contains
       if (self%prediction%takes_balance) return
       call contact%constants%bind(keys, tangential_stiffness_key(), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
+      call bind_normal_constants(keys, contact)
    end subroutine bind_keys
 
    subroutine take_constants(self, contact)
@@ -125,9 +128,24 @@ contains
          ! One stiffness for both tangential directions: friction prefers no direction either.
          if (any(self%present(1:2, i))) self%prediction%stiffness(i, 1:2) = &
             contact%tangential_stiffness(i)
-         if (self%present(3, i)) self%prediction%stiffness(i, 3) = contact%normal_stiffness(i)
       end do
+      call self%take_normal(contact)
+      call self%take_facts(contact)
    end subroutine take_constants
+
+   !> Pressure along a curve is taken at instants, and has no polynomial pieces between events.
+   !> Perturbations and motions in time know it where nothing rubs.
+   subroutine take_facts(self, contact)
+      class(friction_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+
+      if (self%prediction%takes_balance .or. .not. any(curved_pairs(contact))) return
+      call self%note_curves(contact)
+      self%facts%has_events = .false.
+      self%facts%acts_at_once = .not. any(contact%mu > 0.0_wp)
+      self%facts%has_multipliers = self%facts%acts_at_once
+      self%facts%is_integrated = self%facts%acts_at_once
+   end subroutine take_facts
 
    !> Blocks of pairs are marched together, so that all arrays run over the pairs first.
    subroutine reserve(self, fourier, work)
@@ -138,6 +156,7 @@ contains
       type(friction_room), allocatable :: room
 
       call work%reserve(self%n_elements, self%n_components, fourier)
+      call self%reserve_normal(fourier, work)
       allocate (room)
       allocate (room%margin(self%n_elements), source=0.0_wp)
       allocate (room%settled(self%n_elements), room%moved(self%n_elements), source=.false.)
@@ -156,6 +175,7 @@ contains
       type(fourier_type), intent(in) :: fourier
 
       march_pays = self%facts%remembers .and. self%two_directions .and. &
+                   .not. self%facts%is_curved .and. &
                    any(self%n_elements >= pairs_of_march .and. &
                        fourier%n_coefficients >= coefficients_of_march)
    end function march_pays
@@ -189,6 +209,7 @@ contains
          ! Gap, wear and constant loads: means that are no part of the coefficients.
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
+      call self%take_pressures(work)
       ! Before the march: what counts as repeated is relative to the largest prediction.
       call work%measure_scale()
       n_blocks = (self%n_elements + block_size - 1)/block_size
@@ -207,6 +228,10 @@ contains
       call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft, &
                                    wanted)
       call classify(room, work)
+      ! A pair that sticks presses along its curve all the same: no identity.
+      if (self%facts%is_curved) then
+         where (work%state == pair_stuck) work%state = pair_mixed
+      end if
       if (work%measures_slip) then
          ! The march has ended where it started, so one more turn over the same prediction is the
          ! period.

@@ -140,6 +140,13 @@ contains
 
       call of_pair%turn%project(fourier, room%waves, self%present(:, i), of_pair%sums, &
                                 work%jacobian(:, :, i))
+      if (self%facts%is_curved) then
+         call of_pair%sums%form(fourier, room%waves, 3*fourier%n_coefficients, &
+                                work%jacobian(2*fourier%n_coefficients + 1, &
+                                              2*fourier%n_coefficients + 1, i), &
+                                of_pair%turn%pressing)
+         return
+      end if
       of_pair%sums%wanted = of_pair%bears
       call project_normal(work%jacobian(:, :, i), fourier, room%waves, of_pair%sums, &
                           self%present(3, i))
@@ -201,7 +208,8 @@ contains
       type(derivative_room), intent(inout) :: of_pair
 
       call of_pair%sums%reserve(fourier)
-      if (.not. work%differentiates_slip .and. count(self%present(1:2, i)) == 1) then
+      if (.not. work%differentiates_slip .and. count(self%present(1:2, i)) == 1 .and. &
+          .not. self%facts%is_curved) then
          call differentiate_one_direction(self, fourier, room, i, work, of_pair)
       else
          call differentiate_rows(self, fourier, room, i, work, of_pair)
@@ -306,6 +314,7 @@ contains
          end do
       end if
       of_pair%bears = of_pair%y(3, :) < 0.0_wp
+      if (self%facts%is_curved) of_pair%turn%pressing = work%pressing(i, :)
       call derive(self, fourier, room%settled(i), work, i, of_pair, x, unique)
       if (allocated(work%march)) then
          ! Pairs without a tangential direction come here too, and are not marched.
@@ -340,6 +349,7 @@ contains
       associate (nc => fourier%n_coefficients, n_time => fourier%n_time)
          call slip_weights(n_time, of_pair%y, self%mu(i), self%facts%remembers, x, of_pair%by_x, &
                            of_pair%by_p)
+         if (self%facts%is_curved) of_pair%by_p = of_pair%turn%pressing*of_pair%by_p
          call of_pair%turn%sum_positions(nc, fourier%synthesis, self%present(:, i), of_pair%by_x, &
                                          gradient)
          if (unique) call add_start(3*nc, n_time, of_pair%by_start, of_pair%turn%dx, of_pair%by_x, &

@@ -38,7 +38,7 @@ contains
    end subroutine reserve
 
    !> The transposed block (input, output), of the instants that are wanted.
-   subroutine form(self, fourier, waves, n_stored, block)
+   subroutine form(self, fourier, waves, n_stored, block, factor)
       class(instant_sum), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
       !> Of its harmonics, where the analysis is the projection.
@@ -46,21 +46,29 @@ contains
       !> Rows of the matrix that the block belongs to.
       integer, intent(in) :: n_stored
       real(wp), intent(inout) :: block(n_stored, *)
+      !> What the prediction counts at each instant, wanted or not (n_time); default: 1 where it is
+      !> wanted.
+      real(wp), intent(in), contiguous, optional :: factor(:)
       integer :: k, n, nc
 
       nc = fourier%n_coefficients
       if (fourier%projects) then
          call self%sums%reserve(waves)
-         call add_runs(self, waves)
+         if (present(factor)) then
+            call self%sums%of_values(waves, factor)
+         else
+            call add_runs(self, waves)
+         end if
          block(:nc, :nc) = 0.0_wp
          call self%sums%add_products(waves, n_stored, block)
          return
       end if
       n = 0
       do k = 1, fourier%n_time
-         if (.not. self%wanted(k)) cycle
+         if (.not. (self%wanted(k) .or. present(factor))) cycle
          n = n + 1
          self%base(:, n) = fourier%synthesis(:, k)
+         if (present(factor)) self%base(:, n) = factor(k)*self%base(:, n)
          self%weights(:, n) = fourier%analysis(:, k)
       end do
       call dgemm('N', 'T', nc, nc, n, 1.0_wp, self%base, nc, self%weights, nc, 0.0_wp, block, &

@@ -6,6 +6,7 @@ module fw_laws
    use fw_force_law, only: law_facts
    use fw_friction, only: elastic_friction, rigid_friction, rigid_friction_of_rates
    use fw_iwan, only: iwan_friction
+   use fw_normal_law, only: curved_pairs
    use fw_pair_law, only: pair_law
    use fw_regularised, only: regularised_friction
    use fw_rigid_law, only: friction_of_high_order
@@ -50,25 +51,54 @@ contains
       class(pair_law), allocatable, intent(out) :: law
       class(pair_law), allocatable :: member
       type(several_laws), allocatable :: all
-      integer, allocatable :: numbers(:), pair(:)
-      integer :: k
+      integer :: group(contact%n_pairs)
+      integer, allocatable :: pair(:)
+      integer :: i, k
 
-      numbers = laws_of(contact)
-      if (size(numbers) == 1) then
-         call new_law(numbers(1), law)
+      group = groups_of(contact)
+      if (maxval([group, 1]) == 1) then
+         call new_law(contact%law, law)
          call law%build(contact, present)
          return
       end if
       allocate (all)
-      do k = 1, size(numbers)
-         pair = pairs_of_law(contact, numbers(k))
-         call new_law(numbers(k), member)
+      do k = 1, maxval(group)
+         pair = pack([(i, i=1, size(group))], group == k)
+         call new_law(law_of_pair(contact, pair(1)), member)
          call member%build(part_of(contact, pair), present(:, pair))
          call all%add(member, pair)
       end do
       call all%join(present)
       call move_alloc(all, law)
    end subroutine build_law
+
+   !> Pairs that one law is built for have one number, in the order of their first pairs: those with
+   !> the same word, and of them those whose pressure is a curve (n_pairs).
+   pure function groups_of(contact) result(group)
+      type(contact_type), intent(in) :: contact
+      integer :: group(contact%n_pairs)
+      logical :: curved(contact%n_pairs)
+      integer :: code(contact%n_pairs)
+      integer :: first, i, n
+
+      curved = curved_pairs(contact)
+      code = [(2*law_of_pair(contact, i) + merge(1, 0, curved(i)), i=1, size(code))]
+      n = 0
+      do i = 1, size(code)
+         first = findloc(code, code(i), dim=1)
+         if (first == i) n = n + 1
+         group(i) = merge(n, group(first), first == i)
+      end do
+   end function groups_of
+
+   !> Number of the law of a pair.
+   pure integer function law_of_pair(contact, pair) result(number)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: pair
+
+      number = contact%law
+      if (allocated(contact%law_of)) number = contact%law_of(pair)
+   end function law_of_pair
 
    !> Numbers of the laws that the pairs of a case have, each once, in the order of their pairs.
    pure function laws_of(contact) result(numbers)
@@ -109,6 +139,7 @@ contains
       part%gap = contact%gap(pair)
       part%normal_load = contact%normal_load(pair)
       part%constants = contact%constants%of_pairs(pair)
+      call take_normal_part(contact, pair, part)
       if (allocated(contact%tangential_stiffness)) then
          part%tangential_stiffness = contact%tangential_stiffness(pair)
       end if
@@ -117,22 +148,41 @@ contains
       end if
    end function part_of
 
+   !> How some pairs press.
+   pure subroutine take_normal_part(contact, pair, part)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: pair(:)
+      type(contact_type), intent(inout) :: part
+
+      if (.not. allocated(contact%normal_law)) return
+      part%normal_law = contact%normal_law(pair)
+      part%n_table = contact%n_table
+      if (allocated(contact%overclosure)) part%overclosure = contact%overclosure
+      if (allocated(contact%table_force)) part%table_force = contact%table_force
+      part%normal_per_area = contact%normal_per_area
+      if (allocated(contact%area)) part%area = contact%area(pair)
+   end subroutine take_normal_part
+
    !> What holds of the pairs of a case together.
    !> For checks of the input, which come before any pair is built.
    type(law_facts) function facts_of(contact) result(facts)
       type(contact_type), intent(in) :: contact
       type(contact_type) :: part
-      integer, allocatable :: numbers(:), pair(:)
+      integer :: group(contact%n_pairs)
+      integer, allocatable :: pair(:)
       type(law_facts), allocatable :: each(:)
-      integer :: k
+      integer :: i, k
 
-      numbers = laws_of(contact)
-      allocate (each(size(numbers)))
-      do k = 1, size(numbers)
-         pair = pairs_of_law(contact, numbers(k))
+      group = groups_of(contact)
+      allocate (each(maxval([group, 1])))
+      if (contact%n_pairs == 0) each = facts_of_law(contact%law, contact)
+      do k = 1, maxval([group, 0])
+         pair = pack([(i, i=1, size(group))], group == k)
          part%n_pairs = size(pair)
          part%constants = contact%constants%of_pairs(pair)
-         each(k) = facts_of_law(numbers(k), part)
+         part%mu = contact%mu(pair)
+         call take_normal_part(contact, pair, part)
+         each(k) = facts_of_law(law_of_pair(contact, pair(1)), part)
       end do
       facts = each(1)
       if (size(each) > 1) facts = common_facts(each)

@@ -2,10 +2,13 @@
 !> either constant or from the distance of the two sides.
 module fw_pair_law
    use fw_contact_data, only: contact_type
-   use fw_force_law, only: force_law
+   use fw_force_law, only: force_law, force_workspace
+   use fw_fourier, only: fourier_type
    use fw_key, only: key, key_type, key_visitor
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
+   use fw_normal_law, only: curved_pairs, normal_law, pairs_with, power, press_pairs, table, &
+      take_normal_laws
    implicit none (type, external)
    private
 
@@ -16,12 +19,26 @@ module fw_pair_law
       real(wp), allocatable :: mu(:)
       !> Whether a pair has two tangential directions.
       logical :: two_directions = .false.
+      !> How the pairs press (n_elements); springs where it is not allocated.
+      type(normal_law), allocatable :: normal(:)
    contains
       procedure :: build
       procedure :: bind_keys
       procedure :: take_constants
       procedure :: take_facts
       procedure :: take_pairs
+      procedure :: take_normal
+      procedure :: note_curves
+      procedure :: reserve
+      procedure :: reserve_normal
+      procedure :: take_pressures
+      procedure :: acts_alone
+      procedure :: input_at
+      procedure :: at_instant
+      procedure :: press_at
+      procedure :: input_of_slope
+      procedure :: input_of_pressure
+      procedure :: pressing_constant
       procedure :: slope_at_rest
       procedure :: located
    end type pair_law
@@ -108,6 +125,159 @@ contains
       self%mu = mu
       self%two_directions = any(present(2, :))
    end subroutine take_pairs
+
+   !> What presses the pairs: springs with a stiffness, or curves. Inputs of these are
+   !> displacements, and their forces are decided at instants.
+   pure subroutine take_normal(self, contact)
+      class(pair_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+
+      call take_normal_laws(contact, self%normal)
+      if (allocated(self%normal)) then
+         self%prediction%stiffness(:, 3) = 1.0_wp
+      else if (any(self%present(3, :))) then
+         where (self%present(3, :)) self%prediction%stiffness(:, 3) = contact%normal_stiffness
+      end if
+   end subroutine take_normal
+
+   !> What curved pressures change of the facts: they are taken at instants, enough of them for the
+   !> corners of a table, and for the curvature of a power that jumps where the sides touch.
+   subroutine note_curves(self, contact)
+      class(pair_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+      integer, parameter :: of_power = 1024, of_table = 2048
+
+      self%facts%is_curved = any(curved_pairs(contact))
+      if (any(pairs_with(contact, power))) self%facts%fewest_instants = &
+         max(self%facts%fewest_instants, of_power)
+      if (any(pairs_with(contact, table))) self%facts%fewest_instants = &
+         max(self%facts%fewest_instants, of_table)
+   end subroutine note_curves
+
+   subroutine reserve(self, fourier, work)
+      class(pair_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(out) :: work
+
+      call work%reserve(self%n_elements, self%n_components, fourier)
+      call self%reserve_normal(fourier, work)
+   end subroutine reserve
+
+   !> Room for what `take_pressures` leaves.
+   pure subroutine reserve_normal(self, fourier, work)
+      class(pair_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      if (allocated(self%normal)) allocate (work%pressing(self%n_elements, fourier%n_time), &
+                                            source=0.0_wp)
+   end subroutine reserve_normal
+
+   !> Put pressures in the place of normal inputs at the instants, of curved laws.
+   pure subroutine take_pressures(self, work)
+      class(pair_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+
+      if (allocated(self%normal)) call press_pairs(self%n_elements, size(work%pressing, 2), &
+                                                   self%normal, work%prediction_time, &
+                                                   work%pressing)
+   end subroutine take_pressures
+
+   !> Whether the forces of an element follow from its inputs at the same instant.
+   pure logical function acts_alone(self, element)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+
+      acts_alone = self%facts%acts_at_once
+      associate (unused => element)
+      end associate
+   end function acts_alone
+
+   !> Inputs of an element at an instant, as `evaluate` has them, from its relative displacement and
+   !> velocity.
+   pure function input_at(self, element, u, v, depth) result(y)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      !> (t1, t2, n) [length], [length/time].
+      real(wp), intent(in) :: u(3), v(3)
+      !> Worn [length].
+      real(wp), intent(in) :: depth
+      real(wp) :: y(3)
+      integer :: c
+
+      y = 0.0_wp
+      associate (p => self%prediction)
+         do c = 1, 3
+            if (.not. self%present(c, element)) cycle
+            y(c) = p%stiffness(element, c)*merge(v(c), u(c), p%order_of(element, c) > 0)
+         end do
+         if (self%present(3, element)) then
+            y(3) = y(3) + p%stiffness(element, 3)*(p%gap(element) + depth)
+         else
+            y(3) = -p%load(element)
+         end if
+      end associate
+   end function input_at
+
+   !> Forces of an element of a law that acts at once, and their slopes (input, output): without
+   !> friction, that of what presses.
+   pure subroutine at_instant(self, element, y, force, slope)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y(3)
+      real(wp), intent(out) :: force(3), slope(3, 3)
+
+      force = 0.0_wp
+      slope = 0.0_wp
+      if (allocated(self%normal)) then
+         call self%press_at(element, y(3), force(3), slope(3, 3))
+      else if (y(3) < 0.0_wp) then
+         force(3) = y(3)
+         slope(3, 3) = 1.0_wp
+      end if
+   end subroutine at_instant
+
+   pure subroutine press_at(self, element, y, force, slope)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y
+      real(wp), intent(out) :: force, slope
+      real(wp) :: p
+
+      force = y
+      slope = 1.0_wp
+      if (.not. allocated(self%normal)) return
+      call self%normal(element)%press(-y, p, slope)
+      force = -p
+   end subroutine press_at
+
+   pure real(wp) function input_of_slope(self, element, wanted) result(y)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: wanted
+
+      y = 0.0_wp
+      if (allocated(self%normal)) y = -self%normal(element)%overclosure_of_slope(wanted)
+   end function input_of_slope
+
+   pure subroutine input_of_pressure(self, element, y)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(inout) :: y(:)
+
+      if (.not. allocated(self%normal)) return
+      call self%normal(element)%proportional(.true., y(1))
+      call self%normal(element)%proportional(.false., y(2:))
+   end subroutine input_of_pressure
+
+   pure function pressing_constant(self, element) result(name)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      character(24) :: name
+
+      name = ''
+      if (allocated(self%normal)) name = self%normal(element)%constant_name()
+   end function pressing_constant
 
    !> A pair without friction or load holds nothing tangentially.
    pure real(wp) function slope_at_rest(self, element, component) result(slope)

@@ -15,6 +15,7 @@ module fw_regularised
    use fw_key, only: key, key_visitor
    use fw_key_range, only: above, at_least, at_most, operator(.and.)
    use fw_kinds, only: wp
+   use fw_normal_law, only: bind_normal_constants
    use fw_lapack, only: dgemm
    use fw_pair_law, only: normal_stiffness_key, pair_law
    implicit none (type, external)
@@ -49,6 +50,7 @@ module fw_regularised
       procedure :: n_parameters
       procedure :: by_parameter
       procedure :: instants_wanted
+      procedure :: at_instant
    end type regularised_law
 
    !> Instants while a velocity of full swing passes from -v_0 to v_0, times pi: one in each half.
@@ -66,7 +68,8 @@ contains
       law%prediction%order = [1, 1, 0]
       law%prediction%by_time = .true.
       law%facts = law_facts(fewest_instants=256, instants_per_harmonic=32, &
-                            instants_with_separation=64)
+                            instants_with_separation=64, acts_at_once=.true., &
+                            has_multipliers=.true., is_integrated=.true.)
    end function regularised_friction
 
    subroutine bind_keys(self, keys, contact, slides, closes)
@@ -81,6 +84,7 @@ contains
          'tanh(1) = 76 % of the friction acts', above(0.0_wp), 'L/s', 'n_pairs', &
          absent='required with tangential dofs'), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
+      call bind_normal_constants(keys, contact)
       associate (constants => contact%constants)
          call constants%bind(keys, key('mu_dynamic', 'friction coefficient of fast sliding, '// &
             'to which mu falls', at_least(0.0_wp), '', 'n_pairs', absent='mu'), .false.)
@@ -123,6 +127,7 @@ contains
          self%facts%is_odd = all(abs(constants%get('speed_1', n)) <= 0.0_wp) .and. &
                              all(abs(constants%get('speed_2', n)) <= 0.0_wp)
       end associate
+      call self%note_curves(contact)
    end subroutine take_facts
 
    subroutine take_constants(self, contact)
@@ -136,8 +141,8 @@ contains
          do c = 1, 2
             p%stiffness(:, c) = merge(1.0_wp, 0.0_wp, self%present(c, :))
          end do
-         where (self%present(3, :)) p%stiffness(:, 3) = contact%normal_stiffness
       end associate
+      call self%take_normal(contact)
       call take_sliding(self, contact)
       call self%take_facts(contact)
    end subroutine take_constants
@@ -201,6 +206,7 @@ contains
       do k = 1, fourier%n_time
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
+      call self%take_pressures(work)
       ! One pass over the instants is the period: there is no memory to march.
       call rub(self%n_elements, fourier%n_time, self%mu, self%slip_speed, self%sliding, &
                work%prediction_time, work%force_time, work%pressure)
@@ -275,6 +281,26 @@ contains
       end do
    end subroutine rub
 
+   pure subroutine at_instant(self, element, y, force, slope)
+      class(regularised_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y(3)
+      real(wp), intent(out) :: force(3), slope(3, 3)
+      real(wp) :: pressing, pressure(1), values(1, 3, 1), lambda(1, 3, 1)
+
+      values(1, :, 1) = y
+      pressing = 1.0_wp
+      if (allocated(self%normal)) call self%press_at(element, y(3), values(1, 3, 1), pressing)
+      lambda = 0.0_wp
+      associate (e => element)
+         call rub(1, 1, self%mu(e:e), self%slip_speed(e:e), self%sliding(e:e), values, lambda, &
+                  pressure)
+         call differentiate(self%mu(e), self%slip_speed(e), self%sliding(e), values(1, :, 1), slope)
+      end associate
+      force = lambda(1, :, 1)
+      slope(3, :) = pressing*slope(3, :)
+   end subroutine at_instant
+
    !> tanh(s)/s.
    elemental real(wp) function tanh_over(s)
       real(wp), intent(in) :: s
@@ -299,6 +325,8 @@ contains
          do k = 1, fourier%n_time
             call differentiate(self%mu(i), self%slip_speed(i), self%sliding(i), &
                                work%prediction_time(i, :, k), slope(:, :, k))
+            ! The normal input is a pressure, or makes one along a curve.
+            if (allocated(work%pressing)) slope(3, :, k) = work%pressing(i, k)*slope(3, :, k)
          end do
          do c_out = 1, 3
             do c_in = 1, 3

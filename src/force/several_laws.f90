@@ -37,6 +37,12 @@ module fw_several_laws
       procedure :: tail
       procedure :: fractions
       procedure :: slope_at_rest
+      procedure :: acts_alone
+      procedure :: at_instant
+      procedure :: press_at
+      procedure :: input_of_slope
+      procedure :: input_of_pressure
+      procedure :: pressing_constant
       procedure :: instants_wanted
       procedure :: located
    end type several_laws
@@ -126,12 +132,14 @@ contains
       shared%follows_events = all(facts%follows_events)
       shared%locates_events = any(facts%locates_events) .and. &
                               all(facts%locates_events .or. .not. facts%has_events)
+      shared%acts_at_once = all(facts%acts_at_once)
+      shared%is_curved = any(facts%is_curved)
       shared%needs_projection = any(facts%needs_projection)
       shared%is_hysteretic = any(facts%is_hysteretic)
       shared%measures_slip = all(facts%measures_slip)
       shared%has_tail = all(facts%has_tail)
-      ! Multipliers are found by marching one law.
-      shared%has_multipliers = .false.
+      ! Multipliers are found by marching one law, or at each instant.
+      shared%has_multipliers = shared%acts_at_once .and. all(facts%has_multipliers)
       shared%is_integrated = all(facts%is_integrated)
       ! Those that follow events need none.
       associate (sampled => .not. facts%follows_events .or. shared%follows_events)
@@ -366,6 +374,55 @@ contains
 
       slope = self%member(self%of_member(element))%law%slope_at_rest(self%place(element), component)
    end function slope_at_rest
+
+   pure logical function acts_alone(self, element)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element
+
+      acts_alone = self%member(self%of_member(element))%law%acts_alone(self%place(element))
+   end function acts_alone
+
+   pure subroutine at_instant(self, element, y, force, slope)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y(3)
+      real(wp), intent(out) :: force(3), slope(3, 3)
+
+      call self%member(self%of_member(element))%law%at_instant(self%place(element), y, force, slope)
+   end subroutine at_instant
+
+   pure subroutine press_at(self, element, y, force, slope)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y
+      real(wp), intent(out) :: force, slope
+
+      call self%member(self%of_member(element))%law%press_at(self%place(element), y, force, slope)
+   end subroutine press_at
+
+   pure real(wp) function input_of_slope(self, element, wanted) result(y)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: wanted
+
+      y = self%member(self%of_member(element))%law%input_of_slope(self%place(element), wanted)
+   end function input_of_slope
+
+   pure subroutine input_of_pressure(self, element, y)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(inout) :: y(:)
+
+      call self%member(self%of_member(element))%law%input_of_pressure(self%place(element), y)
+   end subroutine input_of_pressure
+
+   pure function pressing_constant(self, element) result(name)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element
+      character(24) :: name
+
+      name = self%member(self%of_member(element))%law%pressing_constant(self%place(element))
+   end function pressing_constant
 
    pure integer function instants_wanted(self, work) result(n)
       class(several_laws), intent(in) :: self

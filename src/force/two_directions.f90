@@ -36,6 +36,9 @@ module fw_two_directions
       real(wp), allocatable :: dx(:, :)
       !> The same where the last turn starts.
       real(wp), allocatable :: start(:, :)
+      !> Slope of the pressure by the normal input at the instants, where that is no pressure itself
+      !> (n_time).
+      real(wp), allocatable :: pressing(:)
       !> Of each instant: its state, and its vector, or the first of two that a run of stick stands
       !> on (0: none, dx = 0).
       integer, allocatable, private :: state(:), vector(:)
@@ -123,6 +126,8 @@ contains
                   normal(2) = d(1)/length
                   pull(1) = -mu*normal(2)
                   pull(2) = mu*normal(1)
+                  ! dp = -p' dy_n.
+                  if (allocated(self%pressing)) pull = self%pressing(k)*pull
                   ! With one direction there is nothing to turn.
                   share = 0.0_wp
                   if (present(1) .and. present(2)) share = mu*p/length

@@ -8,6 +8,7 @@ module fw_model_file
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hdf5, only: hdf5_file, has_attribute, read_attribute
    use fw_laws, only: law_words
+   use fw_normal_law, only: normal_words
    use fw_model_file_rules, only: check_after, check_before
    use fw_part_file, only: file_source
    use fw_parts, only: keys_of_laws
@@ -50,6 +51,7 @@ contains
          call move_alloc(source%error, error)
       end if
       if (.not. allocated(error)) call read_law(source%file, model%contact, error)
+      if (.not. allocated(error)) call read_normal_law(source%file, model%contact, error)
       if (.not. allocated(error)) call check_after(source%file, model, error)
       call source%file%close(ignored)
    end subroutine read_model_hdf5
@@ -132,6 +134,31 @@ contains
       call fatal_error(error, file%path//': attribute law of /contact is "'//word// &
                        '", expected '//words_text(law_words), status_input)
    end subroutine read_law
+
+   !> The normal law of all pairs, by its word.
+   subroutine read_normal_law(file, contact, error)
+      type(hdf5_file), intent(in) :: file
+      type(contact_type), intent(inout) :: contact
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: word
+      integer :: number
+
+      if (.not. has_attribute(file, '/contact', 'normal_law')) return
+      if (allocated(contact%normal_law)) then
+         call fatal_error(error, file%path//': attribute normal_law of /contact stands beside '// &
+                          '/contact/normal_law: keep one', status_input)
+         return
+      end if
+      call read_attribute(file, '/contact', 'normal_law', word, error)
+      if (allocated(error)) return
+      number = findloc(normal_words == word, .true., dim=1)
+      if (number == 0) then
+         call fatal_error(error, file%path//': attribute normal_law of /contact is "'//word// &
+                          '", expected '//words_text(normal_words), status_input)
+      else if (allocated(contact%side_1)) then
+         contact%normal_law = spread(number, 1, size(contact%side_1, 2))
+      end if
+   end subroutine read_normal_law
 
    !> Number of sectors; 0 where the file has no group /cyclic.
    subroutine count_sectors(file, n_sectors, error)

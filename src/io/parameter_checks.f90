@@ -8,12 +8,14 @@ module fw_parameter_checks
    use fw_law_text, only: law_text
    use fw_laws, only: laws_of, pairs_are_rigid
    use fw_model, only: model_type
+   use fw_normal_law, only: curved_pairs, exponential, pairs_with, power, table
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
-      is_of_matrices, is_per_pair, is_per_spring, normal_load, normal_stiffness, not_negative, &
-      of_closing, of_pressed, of_sliding, parameter_group, parameter_key, parameter_words, &
-      parameters, positive, rotation_speed, static_scale, tangential_stiffness
+      is_of_matrices, is_per_pair, is_per_spring, normal_coefficient, normal_load, &
+      normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, parameter_group, &
+      parameter_key, parameter_words, parameters, positive, reference_force, rotation_speed, &
+      static_scale, tangential_stiffness
    use fw_solver_options, only: continuation_natural
    use fw_values, only: number_text
    implicit none (type, external)
@@ -110,7 +112,19 @@ contains
                                                 contact%constants%has('mu_viscous'))) then
          reason = 'friction that weakens or grows with the speed is not in proportion to mu'
       end if
+      if (number == friction_coefficient .and. any(pairs_with(contact, table))) then
+         reason = "the pressure of normal_law = 'table' has no derivative by mu that is known: "// &
+                  "use parallel pairs of 'penalty'"
+      end if
       if (allocated(reason) .or. any(pairs_of(contact, number))) return
+      select case (number)
+      case (normal_coefficient); reason = "no pair has normal_law = 'power'"
+      case (reference_force); reason = "no pair has normal_law = 'exponential'"
+      case (normal_stiffness)
+         if (any(curved_pairs(contact))) reason = "no pair has normal_law = 'unilateral'"
+      case default ! by the dofs
+      end select
+      if (allocated(reason)) return
       select case (parameters(number)%pairs)
       case (of_sliding); reason = 'no pair has a tangential dof'
       case (of_closing); reason = 'no pair has a normal dof'
@@ -145,6 +159,12 @@ contains
          case (of_closing); counts = c%side_1(3, :) /= 0 .or. c%side_2(3, :) /= 0
          case (of_pressed); counts = c%side_1(3, :) == 0 .and. c%side_2(3, :) == 0
          case default; counts = .false.
+         end select
+         select case (number)
+         case (normal_stiffness); counts = counts .and. .not. curved_pairs(c)
+         case (normal_coefficient); counts = counts .and. pairs_with(c, power)
+         case (reference_force); counts = counts .and. pairs_with(c, exponential)
+         case default ! of all of them
          end select
          if (.not. allocated(c%law_of)) return
          if (any(number == [friction_coefficient, normal_load, gap])) return

@@ -7,6 +7,7 @@
 module fw_point_quantities
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_case, only: case_type
+   use fw_elements, only: element_kind
    use fw_hdf5, only: growing_integer, growing_logical, growing_real
    use fw_kinds, only: wp
    use fw_parameters, only: is_of_elements, is_per_pair, is_per_spring, n_parameter_words, &
@@ -14,9 +15,9 @@ module fw_point_quantities
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
-      follows_parameter, goes_over, has_endurance, has_levels, has_stress, has_tensor, &
-      is_accurate, is_controlled, is_mission, is_mode, is_response, scales_load, shows_contact, &
-      wears
+      follows_parameter, goes_over, has_dampers, has_endurance, has_levels, has_stress, &
+      has_tensor, is_accurate, is_controlled, is_mission, is_mode, is_response, scales_load, &
+      shows_contact, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -122,6 +123,8 @@ contains
                'share of the period in stick, slip, open', shows_contact)
       call add('contact/dissipation', r, '<energy>', 'point pair', 'friction energy per cycle', &
                shows_contact)
+      call add('damper/dissipation', r, '<energy>', 'point dampers', 'energy that each damper '// &
+               'takes per cycle', has_dampers)
       call add('history/observed', r, '<length>', 'point instant observed', &
                'observed quantities over one period', always)
       call add('history/force', r, '<force>', 'point instant pair direction', &
@@ -266,6 +269,8 @@ contains
          n = 6
       case ('patch')
          n = count_patches(case%contact)
+      case ('dampers')
+         n = case%elements%count_of('damper')*case%model%cyclic%n_solved()
       case ('direction', 'state')
          n = 3
       case ('part')
@@ -385,6 +390,10 @@ contains
          if (allocated(point%fraction)) values = reshape(point%fraction, [size(point%fraction)])
       case ('contact/dissipation')
          if (allocated(point%dissipation)) values = point%dissipation
+      case ('damper/dissipation')
+         if (.not. allocated(point%work_of)) return
+         k = element_kind('damper')
+         if (allocated(point%work_of(k)%values)) values = point%work_of(k)%values
       case ('history/observed')
          call by_rows(point%history, values)
       case ('history/force')

@@ -8,8 +8,9 @@ module fw_quantity_conditions
    private
 
    public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
-             goes_over, has_endurance, has_levels, has_stress, has_tensor, is_accurate, &
-             is_controlled, is_mission, is_mode, is_response, scales_load, shows_contact, wears
+             goes_over, has_dampers, has_endurance, has_levels, has_stress, has_tensor, &
+             is_accurate, is_controlled, is_mission, is_mode, is_response, scales_load, &
+             shows_contact, wears
 
 contains
 
@@ -91,6 +92,13 @@ contains
 
       is_controlled = case%control%is_wanted()
    end function is_controlled
+
+   !> Dampers, and forces of the joint are wanted.
+   pure logical function has_dampers(case)
+      type(case_type), intent(in) :: case
+
+      has_dampers = case%output%contact .and. case%elements%count_of('damper') > 0
+   end function has_dampers
 
    !> Whether harmonics differ from point to point.
    pure logical function has_levels(case)

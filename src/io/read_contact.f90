@@ -10,6 +10,8 @@ module fw_read_contact
    use fw_kinds, only: wp
    use fw_law_text, only: law_text
    use fw_laws, only: law_words, laws_of, is_rigid, pairs_are_hysteretic
+   use fw_normal_law, only: curved_pairs
+   use fw_read_normal, only: check_normal_laws, match_normal_dofs, read_normal_law
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_text_list, only: name_sectors
@@ -38,9 +40,12 @@ contains
       ! The order matters: see fw_contact_keys.
       call read_n_pairs(reader, file_pairs, n_sectors, contact)
       call bind_law(reader, contact)
+      call read_normal_law(reader, contact)
       call read_sides(reader, contact)
       if (n_sectors > 1) call repeat_pairs(reader, n_sectors, contact)
-      call read_constants(reader, needs_area, contact)
+      call match_normal_dofs(reader, has_normal(contact), contact)
+      call read_constants(reader, needs_area .or. (contact%normal_per_area .and. &
+                                                any(curved_pairs(contact))), contact)
       call read_law(reader, contact)
       call bind_march(reader, contact)
       scale = contact%penalty_scale
@@ -113,6 +118,7 @@ contains
       end if
       contact%n_alike = n_sectors
       if (allocated(contact%law_of)) contact%law_of = [(contact%law_of, j=1, n_sectors)]
+      if (allocated(contact%normal_law)) contact%normal_law = [(contact%normal_law, j=1, n_sectors)]
       contact%n_pairs = n*n_sectors
       contact%side_1 = reshape([(contact%side_1, j=1, n_sectors)], [3, contact%n_pairs])
       contact%side_2 = reshape([(contact%side_2, j=1, n_sectors)], [3, contact%n_pairs])
@@ -219,7 +225,8 @@ contains
       character(24) :: name
       integer :: other
 
-      call bind_laws(reader, contact, has_tangent(contact), has_normal(contact))
+      call bind_laws(reader, contact, has_tangent(contact), &
+                     has_normal(contact) .and. .not. curved_pairs(contact))
       call contact%constants%first_of_others(laws_of(contact), name, other)
       if (other > 0) then
          call reader%refuse('contact', trim(name), "belongs to law = '"//trim(law_words(other))// &
@@ -240,6 +247,7 @@ contains
       if (reader%failed()) return
       if (allocated(contact%law_of)) call check_values(reader, contact)
       if (reader%failed()) return
+      call check_normal_laws(reader, contact)
       if (contact%constants%has('normal_stiffness')) call check_normal_zeros(reader, contact)
       if (contact%constants%has('tangential_stiffness')) call check_zeros(reader, contact)
       call check_hysteresis(reader, contact)
@@ -312,7 +320,8 @@ contains
       type(contact_type), intent(in) :: contact
       integer :: i
 
-      i = findloc(has_normal(contact) .and. take(contact, 'normal_stiffness') .and. &
+      i = findloc(has_normal(contact) .and. .not. curved_pairs(contact) .and. &
+                  take(contact, 'normal_stiffness') .and. &
                   contact%normal_stiffness <= 0.0_wp, .true., 1)
       if (i > 0) call reader%refuse('contact', 'normal_stiffness', '= 0 for pair '// &
                                     to_text(i)//': must be above 0 where there is a normal dof')

@@ -14,7 +14,7 @@ module fw_result
    use fw_harmonics_options, only: sampling_words
    use fw_hdf5, only: hdf5_file, write_attribute
    use fw_kinds, only: wp
-   use fw_law_text, only: law_of_pairs
+   use fw_law_text, only: law_of_pairs, normal_law_of_pairs
    use fw_point, only: point_type
    use fw_result_group, only: group_writer, result_group
    use fw_result_part, only: at_work, create_part, delete_part, publish_part
@@ -347,6 +347,10 @@ contains
       if (allocated(contact%law_of)) then
          call law_of_pairs(contact, words)
          call to%put('/contact/law', words, '', 'pair', 'law of the pair')
+      end if
+      if (allocated(contact%normal_law)) then
+         call normal_law_of_pairs(contact, words)
+         call to%put('/contact/normal_law', words, '', 'pair', 'normal law of the pair')
       end if
    end subroutine write_pairs
 

@@ -89,6 +89,8 @@ contains
       sizes%contact%n_pairs = case%contact%n_pairs
       sizes%springs%n_springs = case%springs%n_springs
       sizes%elements = case%elements
+      sizes%model%cyclic%is_mistuned = case%model%cyclic%is_mistuned
+      sizes%model%cyclic%n_sectors = case%model%cyclic%n_sectors
       if (allocated(case%model%unit_system)) sizes%model%unit_system = case%model%unit_system
       if (allocated(case%model%observe_matrix)) then
          allocate (sizes%model%observe_matrix(case%model%n_observed(), 0))

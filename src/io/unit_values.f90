@@ -224,7 +224,44 @@ contains
       ! F/L^power.
       at = index(unit, 'power')
       if (at > 0) unit(at:) = spring_power(reader)
+      if (entry%group == 'contact') unit = pressing_unit(reader, entry%key, unit)
    end function unit_of
+
+   !> The same of what presses pairs along a curve: F/L^e of an exponent e that is whole, and all of
+   !> them per area where the case says so.
+   character(40) function pressing_unit(reader, key, declared) result(unit)
+      type(reader_type), intent(in) :: reader
+      character(*), intent(in) :: key, declared
+      integer, parameter :: largest = 9
+      integer :: e
+
+      unit = declared
+      if (all(key /= [character(18) :: 'normal_coefficient', 'reference_force', 'force'])) return
+      e = merge(2, 0, index(lower_case(reader%text_of('contact', 'normal_per_area')), 't') > 0)
+      if (key == 'normal_coefficient') then
+         unit = 'F/L^??'
+         associate (exponent => number_of_text(reader%text_of('contact', 'normal_exponent')))
+            if (exponent < 1 .or. exponent > largest) return
+            e = e + exponent
+         end associate
+      end if
+      unit = 'F'
+      if (e > 0) unit = 'F/L^'//trim(to_text(e))
+   end function pressing_unit
+
+   !> A whole number; 0 for any other text.
+   pure integer function number_of_text(text) result(number)
+      character(*), intent(in) :: text
+      integer :: status
+
+      number = 0
+      if (len_trim(text) == 0 .or. verify(trim(text), '0123456789.') > 0) return
+      if (index(text, '.') > 0) then
+         if (verify(trim(text(index(text, '.') + 1:)), '0') > 0) return
+      end if
+      read (text(:scan(trim(text)//'.', '.') - 1), *, iostat=status) number
+      if (status /= 0) number = 0
+   end function number_of_text
 
    !> Keys whose unit is that of the parameter that a sweep, or a track, goes over.
    pure logical function is_of_parameter(entry)
@@ -367,6 +404,8 @@ contains
 
       if (len(unit) == 0) then
          message = 'the key has no unit: must be a number'
+      else if (index(unit, '??') > 0) then
+         message = 'normal_exponent beside it is no whole number: must be a number'
       else if (index(unit, '?') > 0) then
          message = 'the powers of the springs differ or are not given beside it: must be a number'
       end if

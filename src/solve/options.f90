@@ -191,7 +191,7 @@ contains
       call keys%bind(key('max_points', 'points of a branch at most', at_least(1), &
                          only="continuation = 'arclength'"), self%max_points)
       call keys%bind(key('stability', 'compute the Floquet multipliers of every point', &
-                         only="springs and law = 'penalty'"), self%stability)
+                         only="springs, law = 'penalty', 'regularised'"), self%stability)
       call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
                          only="analysis = 'frf', continuation = 'natural'"), self%refine)
    end subroutine bind_sweep_keys

@@ -3,7 +3,8 @@
 !>   s = s_free - W lambda,
 !>   normal      lambda_n <= 0, s_n >= 0, lambda_n s_n = 0          (Signorini),
 !>   tangential  |lambda_t| <= mu |lambda_n|, in slip lambda_t = mu |lambda_n| s_t/|s_t|  (Coulomb),
-!>   springs     lambda = coefficient s**power.
+!>   springs     lambda = coefficient s**power,
+!>   others      lambda = f(s, ds/dt) at the middle of the step (laws that act at once).
 !>
 !> s measures from where the pair would stay closed and stuck. W is the Delassus operator, with
 !> the compliance of the penalty law on its diagonal: an elastic pair is a rigid one behind its
@@ -32,6 +33,9 @@ module fw_contact_step
       real(wp), allocatable :: force(:)
       !> Where the pair would stay without force (n_rows).
       real(wp), allocatable :: free(:)
+      !> Of rows of pairs that act at once: relative displacement at the start of the step, and
+      !> velocity in its middle over what the displacement gains up to there (n_rows).
+      real(wp), allocatable :: start(:), speed(:)
       !> Whether the gap of the pair is closed, so that it may bear (n_pairs).
       logical, allocatable :: closed(:)
       !> state_open, state_stick or state_slip (n_pairs).
@@ -57,7 +61,7 @@ contains
 
       n = structure%n_rows
       allocate (self%force(n), self%free(n), self%rate(n), self%mismatch(n), self%relative(n), &
-                source=0.0_wp)
+                self%start(n), self%speed(n), source=0.0_wp)
       allocate (self%closed(structure%n_pairs), source=.true.)
       allocate (self%state(structure%n_pairs), source=state_stick)
       allocate (self%slope(3, 3, structure%n_pairs), source=0.0_wp)
@@ -128,7 +132,11 @@ contains
          self%relative = self%relative - w(:, r)*self%force(r)
       end do
       do i = 1, structure%n_pairs
-         call project_pair(self, structure, i)
+         if (structure%at_once(i)) then
+            call follow_pair(self, structure, i)
+         else
+            call project_pair(self, structure, i)
+         end if
       end do
       ! A spring knows no states: its force is a function of s, and the mismatch its residual.
       do i = 1, structure%n_springs
@@ -187,6 +195,40 @@ contains
       end associate
    end subroutine project_pair
 
+   !> One pair whose forces are functions of displacement and velocity: mismatch lambda - f, and
+   !> slope = df/ds (output, input).
+   pure subroutine follow_pair(self, structure, i)
+      class(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      integer, intent(in) :: i
+      real(wp) :: u(3), v(3), force(3), slope(3, 3), by_s(3)
+      integer :: c, r
+
+      u = 0.0_wp
+      v = 0.0_wp
+      by_s = 0.0_wp
+      associate (law => structure%law)
+         do c = 1, 3
+            r = structure%row(c, i)
+            if (r == 0) cycle
+            u(c) = self%relative(r)
+            v(c) = self%speed(r)*(u(c) - self%start(r))
+            by_s(c) = law%prediction%stiffness(i, c)
+            if (law%prediction%order_of(i, c) > 0) by_s(c) = by_s(c)*self%speed(r)
+         end do
+         call law%at_instant(i, law%input_at(i, u, v, structure%depth(i)), force, slope)
+         self%state(i) = state_open
+         ! Smooth friction never sticks; without friction there is nothing to slip.
+         if (force(3) < 0.0_wp) self%state(i) = merge(state_slip, state_stick, &
+                                                      law%prediction%order_of(i, 1) > 0)
+      end associate
+      do c = 1, 3
+         self%slope(c, :, i) = slope(:, c)*by_s
+         r = structure%row(c, i)
+         if (r > 0) self%mismatch(r) = self%force(r) - force(c)
+      end do
+   end subroutine follow_pair
+
    !> force <- force - J^-1 mismatch, J = 1 - slope (1 - rate W).
    subroutine newton_step(self, structure, w, singular)
       type(contact_problem), intent(inout) :: self
@@ -209,6 +251,11 @@ contains
                do d = 1, 3
                   q = structure%row(d, i)
                   if (q == 0 .or. abs(self%slope(c, d, i)) <= 0.0_wp) cycle
+                  if (structure%at_once(i)) then
+                     ! Of lambda - f(s) = 0, with ds = -W dlambda.
+                     jacobian(r, :) = jacobian(r, :) + self%slope(c, d, i)*w(q, :)
+                     cycle
+                  end if
                   jacobian(r, q) = jacobian(r, q) - self%slope(c, d, i)
                   ! 1 - slope (1 - rate W), row by row.
                   jacobian(r, :) = jacobian(r, :) + self%slope(c, d, i)*self%rate(q)*w(q, :)
@@ -246,11 +293,17 @@ contains
          if (done) return
          do i = 1, structure%n_pairs
             ! With the relative motion as the pairs before have left it.
-            call project_pair(self, structure, i)
+            if (structure%at_once(i)) then
+               call follow_pair(self, structure, i)
+            else
+               call project_pair(self, structure, i)
+            end if
             do c = 1, 3
                r = structure%row(c, i)
                if (r == 0) cycle
                change = -self%mismatch(r)
+               if (structure%at_once(i)) change = change/(1.0_wp + max(self%slope(c, c, i), &
+                                                                       0.0_wp)*w(r, r))
                self%force(r) = self%force(r) + change
                self%relative = self%relative - w(:, r)*change
             end do

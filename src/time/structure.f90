@@ -45,6 +45,11 @@ module fw_time_structure
       real(wp), allocatable :: compliance(:)
       !> Friction coefficient, gap with wear [length], constant normal force [force] (n_pairs).
       real(wp), allocatable :: mu(:), gap(:), normal_load(:)
+      !> The law of the pairs, those that act at once, by its `at_instant` (n_pairs), and the depth
+      !> that they are worn by [length].
+      class(pair_law), allocatable :: law
+      logical, allocatable :: at_once(:)
+      real(wp), allocatable :: depth(:)
       !> Springs: force coefficient * e**power (n_springs).
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
@@ -84,27 +89,30 @@ contains
       type(contact_type), intent(in) :: contact
       logical, intent(in) :: present(:, :)
       type(time_structure), intent(inout) :: self
-      class(pair_law), allocatable :: law
       integer :: i, c
 
       allocate (self%row(3, contact%n_pairs), source=0)
       allocate (self%compliance(3*contact%n_pairs), source=0.0_wp)
       allocate (self%rows(self%n_dof, 3*contact%n_pairs + self%n_springs), source=0.0_wp)
-      allocate (self%mu(0), self%gap(0), self%normal_load(0))
+      allocate (self%mu(0), self%gap(0), self%normal_load(0), self%at_once(0), self%depth(0))
       if (contact%n_pairs == 0) return
-      call build_law(contact, present, law)
-      self%mu = law%mu
+      call build_law(contact, present, self%law)
+      self%mu = self%law%mu
+      self%at_once = [(self%law%acts_alone(i), i=1, contact%n_pairs)]
+      self%depth = 0.0_wp*self%mu
+      if (allocated(contact%depth)) self%depth = contact%depth
       ! Worn depth opens the contact further (docs/theory.md, Motion).
-      self%gap = law%prediction%gap
+      self%gap = self%law%prediction%gap
       if (allocated(contact%depth)) self%gap = self%gap + contact%depth
-      self%normal_load = law%prediction%load
+      self%normal_load = self%law%prediction%load
       do i = 1, contact%n_pairs
          do c = 1, 3
             if (.not. present(c, i)) cycle
-            if (.not. law%prediction%takes(i)) then
-               associate (stiffness => law%prediction%stiffness(i, c))
+            if (.not. self%law%prediction%takes(i)) then
+               associate (stiffness => self%law%prediction%stiffness(i, c))
                   if (stiffness <= 0.0_wp) cycle
-                  self%compliance(self%n_rows + 1) = 1.0_wp/stiffness
+                  ! A pair that acts at once is its own law, as a spring is.
+                  if (.not. self%at_once(i)) self%compliance(self%n_rows + 1) = 1.0_wp/stiffness
                end associate
             end if
             self%n_rows = self%n_rows + 1

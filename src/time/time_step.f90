@@ -83,7 +83,12 @@ contains
             do c = 1, 3
                r = s%row(c, i)
                if (r == 0) cycle
-               if (.not. in_positions(s, r)) then
+               if (s%at_once(i)) then
+                  free(r) = self%row_increment(r) + self%row_position(r)
+                  self%contact%start(r) = self%row_position(r)
+                  ! Massless directions go from value to value, the others from end to end.
+                  self%contact%speed(r) = merge(1.0_wp, 2.0_wp, s%massless(r))/h
+               else if (.not. in_positions(s, r)) then
                   ! v+ = 4 d/h - v: v+ = 0 at d = h v/4.
                   free(r) = self%row_increment(r) - 0.25_wp*h*self%row_velocity(r)
                   if (c == 3) self%contact%closed(i) = self%row_position(r) + s%gap(i) <= 0.0_wp
@@ -122,7 +127,7 @@ contains
             ! Unknown (-1) before the first step.
             if (self%contact%state(i) /= self%last_state(i) .and. self%last_state(i) >= 0) then
                any_change = .true.
-            else if (self%contact%state(i) == state_slip) then
+            else if (self%contact%state(i) == state_slip .and. .not. s%at_once(i)) then
                turn = 0.0_wp
                do c = 1, 2
                   r = s%row(c, i)
@@ -189,7 +194,9 @@ contains
                ! Of a row with mass: its whole motion works against the mean force.
                step_length = 2.0_wp*self%row_increment(r)
                force = contact%force(r)
-               if (in_positions(s, r)) then
+               if (s%at_once(i)) then
+                  if (s%massless(r)) step_length = self%row_increment(r)
+               else if (in_positions(s, r)) then
                   step_length = 0.0_wp
                   if (c < 3 .and. contact%state(i) /= state_stick) then
                      ! A row in positions works by the move of its corrected position alone; elastic

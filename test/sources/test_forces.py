@@ -52,8 +52,10 @@ def law_words() -> list[str]:
 
 
 def law_modules() -> set[str]:
-    """Modules of laws that nobody outside of the laws needs: multipliers follow `fw_friction`."""
-    return uses(LAWS) - {"fw_contact_data", "fw_force_law", "fw_pair_law", "fw_friction"}
+    """Modules of laws that nobody outside of the laws needs: multipliers follow `fw_friction`, and
+    checks ask which pairs have the constants of a normal law."""
+    return uses(LAWS) - {"fw_contact_data", "fw_force_law", "fw_pair_law", "fw_friction",
+                         "fw_normal_law"}
 
 
 #: Outside of the laws a law is known by its facts and its prediction. A name of one, or a question
@@ -104,10 +106,10 @@ def test_a_law_is_one_file_one_word_and_one_line() -> None:
 
 def test_multipliers_and_integration_in_time_are_promised_for_coulomb_alone() -> None:
     # src/balance/stability_history.f90 and src/time march Coulomb's law whatever law the pairs
-    # have: any other that promised these facts would get the numbers of that one, without a word.
-    # The springs of polynomial_law.f90 have ways of their own through both.
+    # have, unless it acts at once: any other that promised these facts would get the numbers of
+    # that one, without a word. The springs of polynomial_law.f90 have ways of their own.
     promising = {
         path.name for path in (SRC / "force").rglob("*.f90")
         if re.search(r"\b(has_multipliers|is_integrated)\s*=\s*\.true\.", path.read_text())
     }
-    assert promising == {"friction.f90", "rigid_law.f90", "polynomial_law.f90"}
+    assert promising == {"friction.f90", "rigid_law.f90", "polynomial_law.f90", "regularised.f90"}

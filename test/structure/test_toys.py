@@ -181,10 +181,10 @@ def add_part(toy):
 def add_parameter(toy):
     """'contact%slip_speed': a constant of a law that sweeps go over."""
     toy.change("src/model/parameters.f90",
-               ("      parameter_type('polynomial%coefficient', of_elements)]",
-                "      parameter_type('polynomial%coefficient', of_elements), &\n"
+               (")]\n\n   integer, parameter :: n_parameter_words",
+                "), &\n"
                 "      parameter_type('contact%slip_speed', of_pairs, positive, of_sliding, &\n"
-                "                     .false.)]"))
+                "                     .false.)]\n\n   integer, parameter :: n_parameter_words"))
 
 
 def add_vibration(toy):
