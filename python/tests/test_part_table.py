@@ -34,7 +34,9 @@ def whole(**more: Any) -> fw.Model:
     more = {"contact": PAIRS, **more}
     return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, springs=[fw.Spring(1, 2, 0.5)],
                     static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
-                    stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
+                    stiffness_rotation=EYE, coriolis=0.0 * EYE, structural_damping=0.01 * EYE,
+                    circulatory=0.0 * EYE, stiffness_unsymmetric=EYE, damping_unsymmetric=EYE,
+                    harmonic={2: (EYE[0], EYE[1])},
                     observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
 
 

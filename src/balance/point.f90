@@ -81,6 +81,10 @@ module fw_point
       real(wp), allocatable :: fraction(:, :)
       !> Friction energy per cycle (n_pairs) [force * length].
       real(wp), allocatable :: dissipation(:)
+      !> Work of hysteretic damping per cycle [force * length], and the rotation speed where it
+      !> follows the frequency [rad/s].
+      real(wp) :: structural_work = 0.0_wp
+      real(wp) :: speed = 0.0_wp
       !> Of a nonlinear mode: self-excitation [1/s], modal amplitude [length mass**(1/2)], and the
       !> amplitude of the first harmonic of what is observed, not allocated elsewhere (n_observed).
       real(wp) :: self_excitation = 0.0_wp, modal_amplitude = 0.0_wp

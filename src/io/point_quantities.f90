@@ -14,8 +14,8 @@ module fw_point_quantities
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
-      follows_parameter, goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
-      scales_load, shows_contact, wears
+      follows_parameter, follows_speed, goes_over, has_levels, has_structural, is_accurate, &
+      is_controlled, is_mode, is_response, scales_load, shows_contact, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -121,6 +121,9 @@ contains
                'share of the period in stick, slip, open', shows_contact)
       call add('contact/dissipation', r, '<energy>', 'point pair', 'friction energy per cycle', &
                shows_contact)
+      call add('structural/dissipation', r, '<energy>', 'point', &
+               'work of hysteretic damping per cycle', has_structural)
+      call add('speed', r, 'rad/s', 'point', 'rotation speed', follows_speed)
       call add('history/observed', r, '<length>', 'point instant observed', &
                'observed quantities over one period', always)
       call add('history/force', r, '<force>', 'point instant pair direction', &
@@ -363,6 +366,10 @@ contains
          if (allocated(point%fraction)) values = reshape(point%fraction, [size(point%fraction)])
       case ('contact/dissipation')
          if (allocated(point%dissipation)) values = point%dissipation
+      case ('structural/dissipation')
+         values = [point%structural_work]
+      case ('speed')
+         values = [point%speed]
       case ('history/observed')
          call by_rows(point%history, values)
       case ('history/force')

@@ -175,7 +175,7 @@ contains
       character(*), parameter :: keys(*) = [character(12) :: 'parameter', 'frequencies', &
                                             'values', 'start', 'end', 'unit', 'continuation', &
                                             'n_points', 'max_points', &
-                                            'stability', 'refine', 'first_point', &
+                                            'stability', 'speed_order', 'refine', 'first_point', &
                                             'last_point', 'lead_points']
       integer :: i
 

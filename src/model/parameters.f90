@@ -10,13 +10,14 @@ module fw_parameters
    public :: is_of_loads, is_of_matrices, is_per_pair, is_per_spring
    public :: harmonic_scale, static_scale, friction_coefficient, normal_load, gap, &
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
-             rotation_speed, rayleigh_mass, rayleigh_stiffness
+             rotation_speed, rayleigh_mass, rayleigh_stiffness, loss_factor
    public :: of_sliding, of_closing, of_pressed, not_negative, positive
 
    integer, parameter :: harmonic_scale = 1, static_scale = 2, friction_coefficient = 3, &
                          normal_load = 4, gap = 5, tangential_stiffness = 6, &
                          normal_stiffness = 7, spring_coefficient = 8, modal_damping = 9, &
-                         rotation_speed = 10, rayleigh_mass = 11, rayleigh_stiffness = 12
+                         rotation_speed = 10, rayleigh_mass = 11, rayleigh_stiffness = 12, &
+                         loss_factor = 13
 
    !> Where its values are: one of the loads, one for each pair or spring, one of the matrices.
    integer, parameter :: of_loads = 1, of_pairs = 2, of_springs = 3, of_matrices = 4
@@ -52,7 +53,8 @@ module fw_parameters
       parameter_type('model%modal_damping', of_matrices, not_negative), &
       parameter_type('model%rotation_speed', of_matrices, not_negative), &
       parameter_type('model%rayleigh_mass', of_matrices, not_negative), &
-      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative)]
+      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative), &
+      parameter_type('model%loss_factor', of_matrices, not_negative)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word

@@ -179,8 +179,8 @@ def add_part(toy):
 def add_parameter(toy):
     """'contact%slip_speed': a constant of a law that sweeps go over."""
     toy.change("src/model/parameters.f90",
-               ("      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative)]",
-                "      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative), &\n"
+               ("      parameter_type('model%loss_factor', of_matrices, not_negative)]",
+                "      parameter_type('model%loss_factor', of_matrices, not_negative), &\n"
                 "      parameter_type('contact%slip_speed', of_pairs, positive, of_sliding, &\n"
                 "                     .false.)]"))
 
