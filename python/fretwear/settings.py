@@ -146,8 +146,8 @@ class Structure(TypedDict, total=False):
     #: [F/L] hysteretic, symmetric: i times it is added to the stiffness in harmonics above 0
     #: (default: 0)
     structural_damping: ArrayLike
-    #: [F s/L] stiffness for each rad/s of rotation_speed, skew or any; entry (i, j) is the force on
-    #: dof i by dof j (default: 0)
+    #: [F s/L] stiffness for each rad/s of rotation_speed, of any shape: (i, j) is the force on dof
+    #: i by dof j, column after column (default: 0)
     circulatory: ArrayLike
     #: [F/L] added to the stiffness as it is, of bearings for one (default: 0)
     stiffness_unsymmetric: ArrayLike

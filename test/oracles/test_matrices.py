@@ -493,6 +493,28 @@ def test_peaks_of_a_rotor_are_found_between_coarse_rows(tmp_path):
     assert np.abs(peaks - 1.0 / np.sqrt(1.6)).min() < 1e-3
 
 
+def test_wear_with_hysteretic_damping(tmp_path):
+    """A matrix in proportion to the stiffness is the loss factor, cycle after cycle."""
+    depths = []
+    for as_matrix in (False, True):
+        stiffness = np.diag([1.0, 2.0])
+        case = {"case": {"analysis": "wear"},
+                "model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 0.0], "stiffness": stiffness,
+                          **({"structural_damping": 0.1 * stiffness} if as_matrix
+                             else {"loss_factor": 0.1})},
+                "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 2], "mu": 0.3,
+                            "area": 1.0, "tangential_stiffness": 2.0, "normal_stiffness": 3.0},
+                "load": {"static": [0.0, -1.0], "cosine": [1.0, 0.0]},
+                "harmonics": {"n_harmonics": 3}, "sweep": {"start": 0.9},
+                "wear": {"coefficient": 1e-3, "n_cycles": 20, "max_depth_step": 0.01},
+                "solver": {"tolerance": TOLERANCE}}
+        run(tmp_path, case)
+        with h5py.File(tmp_path / "case.h5") as file:
+            depths.append(file["wear/depth"][()])
+            assert (file["structural/dissipation"][()] > 0.0).all()
+    assert depths[0] == pytest.approx(depths[1], rel=1e-8)
+
+
 # ---------------------------------------------------------------- refused
 
 @pytest.mark.parametrize(("more", "keys", "groups", "words"), [
