@@ -88,7 +88,8 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
 /* Give a part of it by the name of its dataset in a model file; `n` says how many values there
    are and is checked. Everything is copied.
    n_dof * n_dof: "mass", "stiffness" (both required), "damping", "stiffness_rotation"; symmetric;
-                  "coriolis", skew, row after row
+                  "structural_damping", symmetric; row after row "coriolis", skew, and
+                  "circulatory", "stiffness_unsymmetric", "damping_unsymmetric", any
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
                   "contact/tangential_stiffness", "contact/normal_stiffness",
@@ -162,7 +163,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    copies them to a buffer with room for n, and leaves one that is too small as it is.
    1: "omega", "converged", "iterations", "residual", "seconds", "served_by", "fold"; with
    accuracy "harmonics", "instants", "error_estimate"; with a sweep over another
-   parameter "parameter", of a load "load/scale", which &control has with "control/amplitude"
+   parameter "parameter", of a load "load/scale", which &control has with "control/amplitude";
+   "structural/dissipation", energy per cycle, and "speed", where the case has them
    (2H+1, n_observed):    "coefficients", in the order (0, c1, s1, c2, s2, ...)
    (n_observed):          "amplitude", largest magnitude over the period
    (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)

@@ -17,7 +17,8 @@ module fw_python_parts
 
    character(*), parameter :: names = 'mass, stiffness, damping, load/static, load/cosine, '// &
                               'load/sine, load/wave_harmonic, load/wave_power, load/wave, '// &
-                              'coriolis, modal_damping, aero/modes, aero/stiffness, '// &
+                              'coriolis, circulatory, structural_damping, speed_order, '// &
+                              'modal_damping, aero/modes, aero/stiffness, '// &
                               'contact/side_1, contact/side_2, contact/gap, '// &
                               'contact/depth, contact/mu, contact/normal_load, '// &
                               'contact/tangential_stiffness, contact/normal_stiffness, '// &
@@ -56,6 +57,19 @@ contains
             if (allocated(model%load_wave)) values = flat(model%load_wave)
          case ('coriolis')
             if (allocated(model%cyclic%coriolis)) values = flat(transpose(model%cyclic%coriolis))
+         case ('circulatory')
+            ! Its symmetric part is in the stiffness.
+            if (allocated(model%cyclic%circulatory)) then
+               values = flat(transpose(model%cyclic%circulatory))
+            end if
+         case ('structural_damping')
+            if (allocated(model%cyclic%structural)) then
+               values = flat(model%cyclic%structural)
+            else if (model%loss_factor > 0.0_wp) then
+               values = flat(model%loss_factor*model%stiffness)
+            end if
+         case ('speed_order')
+            values = [case%sweep%speed_order]
          case ('modal_damping')
             ! Of sectors: that of other structures is in the damping.
             values = [model%cyclic%modal_damping]

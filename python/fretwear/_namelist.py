@@ -9,7 +9,10 @@ import numpy as np
 
 from .errors import InputError
 
-__all__ = ["literal", "write_namelist"]
+__all__ = ["by_columns", "literal", "write_namelist"]
+
+#: Matrices that need not be symmetric.
+_ANY_SHAPE = ("circulatory", "stiffness_unsymmetric", "damping_unsymmetric")
 
 
 def literal(value: object, name: str = "value") -> str:
@@ -18,7 +21,7 @@ def literal(value: object, name: str = "value") -> str:
     Parameters
     ----------
     value : str, path, bool, int, float, or sequence or array of these
-        Matrices stand row by row; they are symmetric.
+        Matrices stand row by row; most are symmetric (`write_namelist` turns the others).
     name : str, optional
         What a message calls it.
 
@@ -48,11 +51,19 @@ def literal(value: object, name: str = "value") -> str:
                      "or array of these")
 
 
+def by_columns(key: str, value: object) -> object:
+    """A namelist has arrays column by column, which shows in matrices of any shape."""
+    if key.rpartition("%")[2].lower() not in _ANY_SHAPE or np.ndim(value) != 2:  # type: ignore[arg-type]
+        return value
+    return np.transpose(value)  # type: ignore[arg-type]
+
+
 def write_namelist(groups: Mapping[str, Mapping[str, object]]) -> str:
     """The text of a namelist from its groups, such as ``{"case": {"analysis": "frf"}}``."""
     lines = []
     for group, keys in groups.items():
         lines.append(f"&{group}")
-        lines += [f"   {key} = {literal(value, f'{group}%{key}')}" for key, value in keys.items()]
+        lines += [f"   {key} = {literal(by_columns(key, value), f'{group}%{key}')}"
+                  for key, value in keys.items()]
         lines.append("/")
     return "\n".join(lines) + "\n"

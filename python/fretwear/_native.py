@@ -149,7 +149,7 @@ class Session:
         their order does not matter; of the others the last index runs fastest.
         """
         rows_matter = name.startswith(("contact/", "nodal_diameter/", "aero/")) or (
-            name == "coriolis")
+            name in ("coriolis", "circulatory", "stiffness_unsymmetric", "damping_unsymmetric"))
         flat = values.ravel(order="C" if rows_matter else "K")
         put = self._core.put_integers if flat.dtype.kind == "i" else self._core.put_reals
         self._checked(put(self._handle, name, flat))

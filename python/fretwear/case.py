@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-from ._namelist import literal
+from ._namelist import by_columns, literal
 from ._native import Session
 from ._words import where_it_belongs
 from .errors import InputError, OutputError
@@ -201,5 +201,5 @@ def _settings(groups: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
                 f"as {group}={{'key': value}}")))
         name = "model" if group == "structure" else group
         for key, value in keys.items():
-            yield f"{name}%{key}", literal(value, f"{group}[{key!r}]")
+            yield f"{name}%{key}", literal(by_columns(key, value), f"{group}[{key!r}]")
 

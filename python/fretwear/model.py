@@ -188,8 +188,14 @@ class Model:
     stiffness_rotation : (n_dof, n_dof), optional
         Stiffness per square of the rotation speed [force/length/(rad/s)^2].
     coriolis : (n_dof, n_dof), optional
-        Of cyclic structures: Coriolis matrix for each rad/s of the rotation speed, skew
-        [force/length/(rad/s)^2].
+        Coriolis matrix for each rad/s of the rotation speed, skew [force/length/(rad/s)^2].
+    structural_damping : (n_dof, n_dof), optional
+        Hysteretic damping, symmetric: i times it is added to the stiffness in harmonics above 0
+        [force/length].
+    circulatory : (n_dof, n_dof), optional
+        Stiffness for each rad/s of the rotation speed, of any shape [force/length/(rad/s)].
+    stiffness_unsymmetric, damping_unsymmetric : (n_dof, n_dof), optional
+        Matrices of any shape that are added to stiffness and damping, as of bearings.
     static_rotation : (n_dof,), optional
         Static load per square of the rotation speed [force/(rad/s)^2].
     harmonic : mapping, optional
@@ -219,6 +225,10 @@ class Model:
                  observe: Mapping[str, Observation] | None = None,
                  harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
                  coriolis: ArrayLike | None = None,
+                 structural_damping: ArrayLike | None = None,
+                 circulatory: ArrayLike | None = None,
+                 stiffness_unsymmetric: ArrayLike | None = None,
+                 damping_unsymmetric: ArrayLike | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
@@ -229,7 +239,12 @@ class Model:
             name: array(argument, value, (n, n)) for name, argument, value in (
                 ("stiffness", "K", K), ("mass", "M", M), ("damping", "C", C),
                 ("stiffness_rotation", "stiffness_rotation", stiffness_rotation),
-                ("coriolis", "coriolis", coriolis)) if value is not None}
+                ("coriolis", "coriolis", coriolis),
+                ("structural_damping", "structural_damping", structural_damping),
+                ("circulatory", "circulatory", circulatory),
+                ("stiffness_unsymmetric", "stiffness_unsymmetric", stiffness_unsymmetric),
+                ("damping_unsymmetric", "damping_unsymmetric", damping_unsymmetric))
+            if value is not None}
         self._loads = {
             name: array(name, value, (n,)) for name, value in (
                 ("static", static), ("cosine", cosine), ("sine", sine),
@@ -290,7 +305,30 @@ class Model:
     @property
     def coriolis(self) -> Floats | None:
         """Coriolis matrix per rotation speed (n_dof, n_dof), read-only; None for none."""
-        found = self._matrices.get("coriolis")
+        return self._any("coriolis")
+
+    @property
+    def structural_damping(self) -> Floats | None:
+        """Hysteretic damping (n_dof, n_dof), read-only; None for none."""
+        return self._any("structural_damping")
+
+    @property
+    def circulatory(self) -> Floats | None:
+        """Stiffness per rotation speed (n_dof, n_dof), read-only; None for none."""
+        return self._any("circulatory")
+
+    @property
+    def stiffness_unsymmetric(self) -> Floats | None:
+        """What is added to the stiffness (n_dof, n_dof), read-only; None for none."""
+        return self._any("stiffness_unsymmetric")
+
+    @property
+    def damping_unsymmetric(self) -> Floats | None:
+        """What is added to the damping (n_dof, n_dof), read-only; None for none."""
+        return self._any("damping_unsymmetric")
+
+    def _any(self, name: str) -> Floats | None:
+        found = self._matrices.get(name)
         return None if found is None else _read_only(found)
 
     @property
@@ -372,7 +410,7 @@ class Model:
                 if name not in file and "nodal_diameter" not in file:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
-                "mass", "stiffness", "damping", "stiffness_rotation", "coriolis",
+                "mass", "stiffness", "damping", "stiffness_rotation", *_MATRICES,
                 *_CONTACT, *_LOADS, "contact/law", "contact/normal_law", "contact/table",
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
@@ -383,7 +421,7 @@ class Model:
                     springs=_springs_of(file), elements=read_elements(file),
                     sectors=read_sectors(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
-                    coriolis=found.get("coriolis"),
+                    **{name: found.get(name) for name in _MATRICES},
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -506,6 +544,9 @@ class Model:
             for name in _SPRING]
 
 
+#: Matrices that are arguments of their own names.
+_MATRICES = ("coriolis", "structural_damping", "circulatory", "stiffness_unsymmetric",
+             "damping_unsymmetric")
 _SPRING = ("side_1", "side_2", "sector_2", "coefficient", "power")
 _CONTACT = tuple(f"contact/{name}" for name in (
     "side_1", "side_2", "sector_2", "mu", "gap", "area", "position", "patch"))

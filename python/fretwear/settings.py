@@ -23,6 +23,10 @@ UNITS: dict[str, str] = {
     "model%mass": "M",
     "model%stiffness": "F/L",
     "model%damping": "F s/L",
+    "model%structural_damping": "F/L",
+    "model%circulatory": "F s/L",
+    "model%stiffness_unsymmetric": "F/L",
+    "model%damping_unsymmetric": "F s/L",
     "model%rayleigh_mass": "1/s",
     "model%rayleigh_stiffness": "s",
     "model%rotation_speed": "rad/s",
@@ -104,7 +108,8 @@ class Resonance(_Resonance, total=False):
     parameter: Literal["load%harmonic_scale", "load%static_scale", "contact%mu",
                        "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
                        "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
-                       "model%rotation_speed"]
+                       "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
+                       "model%loss_factor"]
     #: first value, or factor; only: analysis = 'resonance' (required, else 0)
     start: float
     #: last value, or factor; only: analysis = 'resonance' (required, else 0)
@@ -142,15 +147,28 @@ class Structure(TypedDict, total=False):
     stiffness: ArrayLike
     #: [F s/L] symmetric; the next three add to it (default: 0)
     damping: ArrayLike
+    #: [F/L] hysteretic, symmetric: i times it is added to the stiffness in harmonics above 0
+    #: (default: 0)
+    structural_damping: ArrayLike
+    #: [F s/L] stiffness for each rad/s of rotation_speed, of any shape: (i, j) is the force on dof
+    #: i by dof j, column after column (default: 0)
+    circulatory: ArrayLike
+    #: [F/L] added to the stiffness as it is, of bearings for one (default: 0)
+    stiffness_unsymmetric: ArrayLike
+    #: [F s/L] added to the damping as it is (default: 0)
+    damping_unsymmetric: ArrayLike
     #: [1/s] adds this times M to the damping (default: 0)
     rayleigh_mass: float
     #: [s] adds this times K, with rotation, to the damping (default: 0)
     rayleigh_stiffness: float
     #: fraction of critical damping of every mode with open contact (default: 0)
     modal_damping: float
-    #: [rad/s] adds its square times stiffness_rotation and load/static_rotation of the model file
-    #: (default: 0)
+    #: [rad/s] adds its square times stiffness_rotation and load/static_rotation of the model file,
+    #: and its multiple of coriolis and circulatory (default: 0)
     rotation_speed: float
+    #: adds i times this part of the stiffness, with rotation, in harmonics above 0: hysteretic
+    #: damping (default: 0)
+    loss_factor: float
 
 
 class Cyclic(TypedDict, total=False):
@@ -391,6 +409,9 @@ class Sweep(_Sweep, total=False):
     #: compute the Floquet multipliers of every point; only: springs, law = 'penalty', 'regularised'
     #: (default: .false.)
     stability: bool
+    #: the rotation speed is the frequency over this: 1 for unbalance, an engine order of the loads;
+    #: 0: it does not follow; only: analysis = 'frf', 'point' (default: 0)
+    speed_order: float
     #: points that are solved to find maxima become rows, in order; only: analysis = 'frf',
     #: continuation = 'natural' (default: .false.)
     refine: bool

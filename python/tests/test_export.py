@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from program import run
 
-from fretwear import InputError
+from fretwear import ContactPairs, InputError, Model
 from fretwear.cli import main
 from fretwear.export import export_mesh, relative_displacement
 from fretwear.export.mesh import read_mesh
@@ -260,6 +260,32 @@ def test_forces_of_coriolis_and_of_the_air_are_recovered(tmp_path: Path) -> None
     for change in ({"coriolis": None}, {"air": np.zeros_like(whirl.air)}, {"modal_damping": 0.0}):
         with pytest.raises(InputError, match="does not follow"):
             recover_displacement(result, replace(structure, whirl=replace(whirl, **change)))
+
+
+@pytest.mark.parametrize("loss_alone", [False, True])
+def test_motion_with_matrices_of_any_shape_is_recovered(tmp_path: Path, loss_alone: bool) -> None:
+    """Skew parts and hysteretic damping belong to the structure, of harmonic 0 too."""
+    rng = np.random.default_rng(5)
+    n, eye = 4, np.eye(4)
+    skew = np.triu(rng.normal(size=(n, n)), 1)
+    skew = skew - skew.T
+    parts = {} if loss_alone else {
+        "coriolis": 0.3 * skew, "circulatory": 0.1 * rng.normal(size=(n, n)),
+        "stiffness_unsymmetric": 0.2 * rng.normal(size=(n, n)),
+        "damping_unsymmetric": 0.02 * rng.normal(size=(n, n)), "structural_damping": 0.02 * eye}
+    stiffness = 2.0 * eye - 0.5 * (np.eye(4, k=1) + np.eye(4, k=-1))
+    pairs = ContactPairs([[2, 0, 0]], [[0, 0, 0]], mu=0.3, normal_load=0.2, law="penalty",
+                         tangential_stiffness=0.8, normal_stiffness=0.0)
+    Model(eye, 0.05 * eye, stiffness, contact=pairs, static=0.1 * eye[2], cosine=0.2 * eye[0],
+          observe={"tip": 4}, **parts).to_hdf5(tmp_path / "m.h5")
+    (tmp_path / "case.nml").write_text(
+        f"&case analysis = 'point' /\n&model source = 'hdf5' file = 'm.h5' loss_factor = 0.03 "
+        f"{'' if loss_alone else 'rotation_speed = 0.6'} /\n"
+        "&harmonics n_harmonics = 5 parity = 'all' /\n&sweep start = 0.9 /\n"
+        "&solver tolerance = 1e-11 /\n")
+    result = run(tmp_path / "case.nml", tmp_path / "case.h5")
+    moved = recover_displacement(result)
+    assert moved[..., 3:] == pytest.approx(result.coefficients, rel=1e-7, abs=1e-10)
 
 
 def test_sectors_on_the_command_line(disk: Result, coarse: Result, tmp_path: Path,

@@ -38,7 +38,9 @@ def whole(**more: Any) -> fw.Model:
                     elements=[fw.Polynomial([[1, -2, 2]], [0.1], of="force", dof=[3]),
                               fw.Damper([1], [0.1], [2], [1.5], [2], [0])],
                     static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
-                    stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
+                    stiffness_rotation=EYE, coriolis=0.0 * EYE, structural_damping=0.01 * EYE,
+                    circulatory=0.0 * EYE, stiffness_unsymmetric=EYE, damping_unsymmetric=EYE,
+                    harmonic={2: (EYE[0], EYE[1])},
                     observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
 
 

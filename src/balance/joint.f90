@@ -35,6 +35,8 @@ module fw_joint
       !> solved for, which row of which sector each is (from 0), see `lay_out_all`.
       type(cyclic_relative) :: cyclic
       integer, allocatable :: row_in_sector(:), sector(:)
+      !> Of a structure that is its only sector: the same as of one that is none.
+      type(relative_type), allocatable :: alone
    contains
       procedure :: wave_weights
    end type joint_type
@@ -99,6 +101,9 @@ contains
       self%half_wave_symmetric = symmetric(model, contact, springs, elements, self)
       if (model%cyclic%is_cyclic) then
          call new_cyclic_relative(model, side_1, side_2, sector_2, self%cyclic)
+         if (.not. model%cyclic%is_alone) return
+         allocate (self%alone)
+         call new_relative(model%n_dof, side_1, side_2, self%alone)
          return
       end if
       call new_relative(model%n_dof, side_1, side_2, self%relative)
@@ -266,6 +271,10 @@ contains
          return
       end if
       moving(1:) = sum(abs(model%load_columns()), dim=2) > 0.0_wp
+      if (allocated(model%cyclic%speed)) then
+         if (allocated(model%cyclic%speed%load)) moving(1:) = moving(1:) .or. &
+            abs(model%cyclic%speed%load) > 0.0_wp
+      end if
       do i = 1, contact%n_pairs
          ! An interference pushes both sides.
          if (contact%gap(i) < 0.0_wp) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) &
@@ -280,8 +289,15 @@ contains
             if (.not. moving(i)) cycle
             moving(1:) = moving(1:) .or. abs(model%mass(:, i)) > 0.0_wp .or. &
                          abs(model%stiffness(:, i)) > 0.0_wp .or. abs(model%damping(:, i)) > 0.0_wp
-            if (allocated(model%cyclic%coriolis)) moving(1:) = moving(1:) .or. &
-               abs(model%cyclic%coriolis(:, i)) > 0.0_wp
+            call couple_by(model%cyclic%coriolis)
+            call couple_by(model%cyclic%circulatory)
+            call couple_by(model%cyclic%structural)
+            if (.not. allocated(model%cyclic%speed)) cycle
+            associate (speed => model%cyclic%speed)
+               call couple_by(speed%coriolis)
+               call couple_by(speed%circulatory)
+               call couple_by(speed%stiffness)
+            end associate
          end do
          do i = 1, contact%n_pairs
             do c = 1, 3
@@ -306,6 +322,13 @@ contains
       end do
 
    contains
+
+      !> What dof i moves by a matrix that may not be there.
+      subroutine couple_by(matrix)
+         real(wp), allocatable, intent(in) :: matrix(:, :)
+
+         if (allocated(matrix)) moving(1:) = moving(1:) .or. abs(matrix(:, i)) > 0.0_wp
+      end subroutine couple_by
 
       subroutine couple(side_1, side_2)
          integer, intent(in) :: side_1, side_2
@@ -345,6 +368,10 @@ contains
       type(law_facts) :: facts
 
       symmetric = all(abs(model%load_static) <= 0.0_wp)
+      if (allocated(model%cyclic%speed)) then
+         if (allocated(model%cyclic%speed%load)) symmetric = symmetric .and. &
+            all(abs(model%cyclic%speed%load) <= 0.0_wp)
+      end if
       if (model%waves%n_waves() > 0) symmetric = symmetric .and. &
          all(modulo(model%waves%harmonic, 2) == 1)
       if (contact%n_pairs > 0) then

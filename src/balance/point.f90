@@ -103,6 +103,10 @@ module fw_point
       real(wp), allocatable :: dissipation(:)
       !> The same of elements that are neither pairs nor springs, kind by kind.
       type(element_work), allocatable :: work_of(:)
+      !> Work of hysteretic damping per cycle [force * length], and the rotation speed where it
+      !> follows the frequency [rad/s].
+      real(wp) :: structural_work = 0.0_wp
+      real(wp) :: speed = 0.0_wp
       !> Of a nonlinear mode: self-excitation [1/s], modal amplitude [length mass**(1/2)], and the
       !> amplitude of the first harmonic of what is observed, not allocated elsewhere (n_observed).
       real(wp) :: self_excitation = 0.0_wp, modal_amplitude = 0.0_wp

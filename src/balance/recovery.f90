@@ -26,9 +26,12 @@ contains
       integer, intent(in) :: n_harmonics
       logical, intent(in) :: with_contact
       type(point_type), intent(inout) :: point
+      complex(wp) :: q(system%problem%structure%n_coordinates, system%problem%fourier%n_retained)
       integer :: i
 
       call observed_coefficients(system, x, n_harmonics, point%coefficients)
+      call to_complex(system%problem%fourier, size(q, 1), x, q)
+      point%structural_work = system%problem%structure%structural_work(system%structure_state, q)
       if (allocated(system%scratch%grid_waves)) then
          ! Another number of harmonics.
          if (size(system%scratch%grid_waves, 1) /= grid_size(n_harmonics)/4 + 1) then

@@ -4,7 +4,7 @@ module fw_resonance_options
    use fw_key, only: key, key_visitor
    use fw_key_range, only: at_least, from_to
    use fw_kinds, only: wp
-   use fw_parameters, only: parameter_words, rotation_speed
+   use fw_parameters, only: parameter_words
    use fw_solver_options, only: continuation_natural, continuation_words, most_points
    implicit none (type, external)
    private
@@ -65,7 +65,7 @@ contains
       call keys%open('resonance', 'a resonance over a parameter of the case')
       call keys%bind_word(key('parameter', 'what changes from point to point', &
                               absent='required', only=only), self%parameter, &
-                          parameter_words(:rotation_speed))
+                          parameter_words)
       call keys%bind(key('start', 'first value, or factor', absent='required', only=only), &
                      self%start, needed=is_resonance)
       call keys%bind(key('end', 'last value, or factor', absent='required', only=only), &

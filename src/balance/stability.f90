@@ -72,7 +72,12 @@ contains
 
       call check_system(system, model%n_dof, error)
       if (allocated(error)) return
-      call new_perturbation_basis(model, system%problem%joint%relative, basis, error)
+      if (allocated(system%problem%joint%alone)) then
+         call new_perturbation_basis(model%at_frequency(system%frequency()), &
+                                     system%problem%joint%alone, basis, error)
+      else
+         call new_perturbation_basis(model, system%problem%joint%relative, basis, error)
+      end if
       if (allocated(error)) return
       call new_history(system, x, history, halved)
       n_harmonics = chosen_harmonics(system, basis)

@@ -8,7 +8,7 @@
 !> (stiffness, nonlinear forces) stays full. Rows are scaled to a unit diagonal first, so that
 !> mixed units do not decide what counts as massless.
 module fw_stability_basis
-   use fw_error, only: error_type
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_incidence, only: incidence_type, new_incidence
    use fw_kinds, only: wp
    use fw_linalg, only: diagonalize, lu_type
@@ -42,7 +42,7 @@ contains
       type(relative_type), intent(in) :: relative
       type(perturbation_basis), intent(out) :: self
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: basis(:, :), rows(:, :), massive(:, :)
+      real(wp), allocatable :: basis(:, :), rows(:, :), massive(:, :), damping(:, :)
       integer :: nb, nd, i
 
       call split_mass(model, basis, self%n_massive, error)
@@ -54,14 +54,35 @@ contains
       nd = self%n_damped
       self%stiffness = matmul(transpose(basis), matmul(model%stiffness, basis))
       allocate (self%damping(self%n, self%n), source=0.0_wp)
+      if (allocated(model%cyclic%circulatory)) self%stiffness = self%stiffness + &
+         matmul(transpose(basis), matmul(model%cyclic%circulatory, basis))
       massive = basis(:, :nb)
-      self%damping(:nb, :nb) = matmul(transpose(massive), matmul(model%damping, massive))
+      damping = model%damping
+      if (allocated(model%cyclic%coriolis)) then
+         call check_coriolis(model%cyclic%coriolis, basis, nb, error)
+         if (allocated(error)) return
+         damping = damping + model%cyclic%coriolis
+      end if
+      self%damping(:nb, :nb) = matmul(transpose(massive), matmul(damping, massive))
       do i = nb + 1, nb + nd
          self%damping(i, i) = 1.0_wp
       end do
       call rows_of_dofs(relative, rows)
       self%direction = matmul(transpose(basis), rows)
    end subroutine new_perturbation_basis
+
+   !> Skew forces of velocities act between directions with mass alone.
+   subroutine check_coriolis(coriolis, basis, n_massive, error)
+      real(wp), intent(in) :: coriolis(:, :), basis(:, :)
+      integer, intent(in) :: n_massive
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: forces(size(basis, 1), size(basis, 2) - n_massive)
+
+      forces = matmul(coriolis, basis(:, n_massive + 1:))
+      if (norm2(forces) <= rank_tolerance*norm2(coriolis)*norm2(basis)) return
+      call fatal_error(error, '&sweep stability: coriolis or damping_unsymmetric acts on a dof '// &
+                       'without mass; give it mass, or leave stability out', status_input)
+   end subroutine check_coriolis
 
    !> Columns (n, n): massive directions of unit mass, then the massless ones.
    subroutine split_mass(model, basis, n_massive, error)

@@ -72,7 +72,8 @@ contains
       call add_forces(contact%side_1, -1.0_wp, force, u(:, 1))
       call add_forces(contact%side_2, 1.0_wp, force, u(:, 1))
       call lu%reserve(model%n_dof)
-      lu%matrix = cmplx(model%stiffness - s**2*model%mass, s*model%damping, wp)
+      lu%matrix = cmplx(model%stiffness - s**2*model%mass, s*model%damping + &
+                        model%loss_factor*model%stiffness, wp)
       call lu%factor(singular)
       ! An undamped mode at this very harmonic: nothing is said of it.
       if (singular) u = (0.0_wp, 0.0_wp)

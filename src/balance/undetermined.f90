@@ -92,7 +92,8 @@ contains
       !> Lowest and highest frequency of all harmonics [rad/s].
       real(wp), intent(in) :: range(2)
 
-      self%is_needed = model%n_dof <= most_dofs .and. .not. model%cyclic%is_cyclic
+      self%is_needed = model%n_dof <= most_dofs .and. .not. model%cyclic%is_cyclic .and. &
+                       model%loss_factor <= 0.0_wp
       if (self%is_needed) self%is_needed = .not. damps_all(model, range)
       if (.not. self%is_needed) return
       self%model = model

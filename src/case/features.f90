@@ -12,7 +12,7 @@ module fw_features
    use fw_kinds, only: wp
    use fw_law_text, only: law_text, law_text_length
    use fw_laws, only: facts_of, is_viscous
-   use fw_parameters, only: harmonic_scale, rotation_speed, static_scale
+   use fw_parameters, only: harmonic_scale, loss_factor, rotation_speed, static_scale
    use fw_resonance_options, only: condition_phase
    use fw_solver_options, only: continuation_arclength, scheme_bdf, scheme_implicit_euler, &
       scheme_runge_kutta, solver_newton, solver_pseudo_time
@@ -25,6 +25,10 @@ module fw_features
    !> Longest phrase.
    integer, parameter :: feature_length = 72
    character(*), parameter :: law_mark = 'a law '
+   !> What makes a structure the only sector of a cyclic one, and what has no time domain.
+   character(*), parameter, public :: &
+      matrices_alone = 'coriolis, structural damping, air or unsymmetric matrices', &
+      hysteretic = 'structural damping (loss_factor) or forces of the air'
 
 contains
 
@@ -111,7 +115,12 @@ contains
       case ('mode%synthesis')
          asked = a == analysis_mode .and. allocated(case%mode%synthesis)
       case ('group &cyclic')
-         asked = case%model%cyclic%is_cyclic
+         asked = case%model%cyclic%has_sectors()
+      case (matrices_alone)
+         asked = case%model%cyclic%is_alone
+      case (hysteretic)
+         asked = case%model%loss_factor > 0.0_wp .or. case%varied == loss_factor .or. &
+                 allocated(case%model%cyclic%structural) .or. allocated(case%model%cyclic%air)
       case ('cyclic%mistuned = .true.')
          asked = case%model%cyclic%is_cyclic .and. case%model%cyclic%is_mistuned
       case default
@@ -164,6 +173,8 @@ contains
          case ('sweep%stability = .true.')
             ! Natural frequencies have no stability to look at.
             asked = sweep%stability .and. case%analysis /= analysis_modes
+         case ('sweep%speed_order')
+            asked = sweep%speed_order > 0.0_wp
          case ('sweep%refine = .true.')
             asked = sweep%refine
          case ('a piece of a sweep')
@@ -288,11 +299,11 @@ contains
       case ('load%harmonic_scale = 0')
          asked = .not. abs(case%model%harmonic_scale) > 0.0_wp
       case ('a case without a vibratory load')
-         if (case%model%cyclic%is_cyclic) return
+         if (case%model%cyclic%has_sectors()) return
          call find_loads(case, first, any_harmonic)
          asked = .not. any_harmonic
       case ('a case without a load in harmonic 1')
-         if (case%model%cyclic%is_cyclic) return
+         if (case%model%cyclic%has_sectors()) return
          call find_loads(case, first, any_harmonic)
          asked = any_harmonic .and. .not. first
       case ("control%of = 'first_harmonic'")

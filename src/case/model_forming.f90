@@ -1,18 +1,20 @@
 !> The matrices and the static load of a model from the parts that were given: rotation, Rayleigh
 !> and modal damping, factors, and the derivatives by these that are wanted.
 module fw_model_forming
+   use fw_cyclic_data, only: speed_matrices
    use fw_damping, only: add_modal_damping
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: matrix_change, model_type
    use fw_raw_model, only: raw_model
    use fw_model_keys, only: model_options
-   use fw_parameters, only: is_of_matrices, modal_damping, rayleigh_mass, rayleigh_stiffness, &
-      rotation_speed
+   use fw_parameters, only: is_of_matrices, loss_factor, modal_damping, rayleigh_mass, &
+      rayleigh_stiffness, rotation_speed
    implicit none (type, external)
    private
 
    public :: model_origin, find_changes, form_structure, form_matrices, finish_structure
+   public :: goes_alone
 
    !> Step of the difference of the modal damping over the stiffness. Of fourth order: its error
    !> is the fourth power of the step, and what it makes of round-off is as small.
@@ -69,7 +71,111 @@ contains
       model%damping = model%damping + options%rayleigh_mass*model%mass &
                       + options%rayleigh_stiffness*model%stiffness
       model%rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)
+      ! Before the matrices below are added, which it is no part of.
+      call add_loss(options, raw, model)
+      call add_unsymmetric(options, raw, model)
+      if (options%speed_order > 0.0_wp) call follow_speed(options, raw, model)
    end subroutine form_matrices
+
+   !> Whether a model that is no sector is solved as the only one of a cyclic structure, whose
+   !> blocks need not be symmetric.
+   pure logical function goes_alone(options, raw) result(alone)
+      type(model_options), intent(in) :: options
+      type(raw_model), intent(in) :: raw
+
+      alone = options%speed_order > 0.0_wp .or. allocated(raw%coriolis) .or. &
+              allocated(raw%circulatory) .or. allocated(raw%cyclic%air) .or. &
+              is_unsymmetric(raw%stiffness_unsymmetric) .or. &
+              is_unsymmetric(raw%damping_unsymmetric)
+      if (allocated(raw%structural_damping)) alone = alone .or. &
+         any(abs(raw%structural_damping) > 0.0_wp)
+      ! The loss factor is one of the stiffness without the matrix that is added.
+      alone = alone .or. (options%loss_factor > 0.0_wp .and. allocated(raw%stiffness_unsymmetric))
+   end function goes_alone
+
+   pure logical function is_unsymmetric(matrix)
+      real(wp), allocatable, intent(in) :: matrix(:, :)
+
+      is_unsymmetric = .false.
+      if (.not. allocated(matrix)) return
+      if (size(matrix, 1) /= size(matrix, 2)) return
+      is_unsymmetric = any(abs(matrix - transpose(matrix)) > 0.0_wp)
+   end function is_unsymmetric
+
+   !> Hysteretic damping: a factor where it is alone, and of sectors a matrix.
+   subroutine add_loss(options, raw, model)
+      type(model_options), intent(in) :: options
+      type(raw_model), intent(in) :: raw
+      type(model_type), intent(inout) :: model
+
+      if (.not. model%cyclic%is_cyclic) then
+         model%loss_factor = options%loss_factor
+         return
+      end if
+      if (allocated(raw%structural_damping)) model%cyclic%structural = raw%structural_damping
+      if (options%loss_factor <= 0.0_wp) return
+      if (.not. allocated(model%cyclic%structural)) then
+         model%cyclic%structural = options%loss_factor*model%stiffness
+      else
+         model%cyclic%structural = model%cyclic%structural + options%loss_factor*model%stiffness
+      end if
+   end subroutine add_loss
+
+   !> Symmetric parts join the matrices, skew ones stand by themselves.
+   subroutine add_unsymmetric(options, raw, model)
+      type(model_options), intent(in) :: options
+      type(raw_model), intent(in) :: raw
+      type(model_type), intent(inout) :: model
+
+      call split(raw%stiffness_unsymmetric, 1.0_wp, model%stiffness, model%cyclic%circulatory)
+      call split(raw%damping_unsymmetric, 1.0_wp, model%damping, model%cyclic%coriolis)
+      if (options%rotation_speed > 0.0_wp) then
+         call split(raw%circulatory, options%rotation_speed, model%stiffness, &
+                    model%cyclic%circulatory)
+      end if
+   end subroutine add_unsymmetric
+
+   !> Add the parts of factor times a matrix.
+   pure subroutine split(matrix, factor, symmetric, skew)
+      real(wp), allocatable, intent(in) :: matrix(:, :)
+      real(wp), intent(in) :: factor
+      real(wp), intent(inout) :: symmetric(:, :)
+      real(wp), allocatable, intent(inout) :: skew(:, :)
+
+      if (.not. allocated(matrix)) return
+      symmetric = symmetric + 0.5_wp*factor*(matrix + transpose(matrix))
+      if (.not. is_unsymmetric(matrix)) return
+      if (.not. allocated(skew)) then
+         skew = 0.5_wp*factor*(matrix - transpose(matrix))
+      else
+         skew = skew + 0.5_wp*factor*(matrix - transpose(matrix))
+      end if
+   end subroutine split
+
+   !> What follows the frequency with the rotation speed.
+   subroutine follow_speed(options, raw, model)
+      type(model_options), intent(in) :: options
+      type(raw_model), intent(in) :: raw
+      type(model_type), intent(inout) :: model
+      type(speed_matrices) :: speed
+
+      speed%order = options%speed_order
+      if (allocated(raw%coriolis)) speed%coriolis = raw%coriolis
+      if (allocated(raw%circulatory)) speed%circulatory = raw%circulatory
+      if (allocated(raw%stiffness_rotation)) then
+         speed%stiffness = raw%stiffness_rotation
+         if (options%rayleigh_stiffness > 0.0_wp) then
+            speed%damping = options%rayleigh_stiffness*raw%stiffness_rotation
+         end if
+         if (options%loss_factor > 0.0_wp) then
+            speed%structural = options%loss_factor*raw%stiffness_rotation
+         end if
+      end if
+      if (allocated(raw%load_static_rotation)) then
+         speed%load = options%static_scale*raw%load_static_rotation
+      end if
+      model%cyclic%speed = speed
+   end subroutine follow_speed
 
    !> Modal damping, and derivatives by what is wanted; without any of these the matrices that were
    !> given are not needed any more.
@@ -152,6 +258,10 @@ contains
          ! The damping of all modes is proportional to the ratio.
          call add_modal_damping(model%mass, model%stiffness, 1.0_wp, change%damping, error)
          change%value = options%modal_damping
+      case (loss_factor)
+         change%stiffness = model%stiffness
+         change%is_loss = .true.
+         change%value = options%loss_factor
       case (rotation_speed)
          call change_by_speed(options, raw, model, change, error)
          change%value = options%rotation_speed

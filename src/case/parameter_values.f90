@@ -7,9 +7,9 @@ module fw_parameter_values
    use fw_model, only: model_type
    use fw_model_forming, only: form_structure
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
-      is_of_matrices, is_per_pair, is_per_spring, modal_damping, normal_load, normal_stiffness, &
-      parameter_group, parameter_key, rayleigh_mass, rayleigh_stiffness, rotation_speed, &
-      static_scale, tangential_stiffness
+      is_of_matrices, is_per_pair, is_per_spring, loss_factor, modal_damping, normal_load, &
+      normal_stiffness, parameter_group, parameter_key, rayleigh_mass, rayleigh_stiffness, &
+      rotation_speed, static_scale, tangential_stiffness
    implicit none (type, external)
    private
 
@@ -160,6 +160,7 @@ contains
          case (rotation_speed); options%rotation_speed = value
          case (rayleigh_mass); options%rayleigh_mass = value
          case (rayleigh_stiffness); options%rayleigh_stiffness = value
+         case (loss_factor); options%loss_factor = value
          case default ! changes no matrix
          end select
       end associate

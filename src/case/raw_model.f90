@@ -49,6 +49,11 @@ module fw_raw_model
       !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
       real(wp), allocatable :: coriolis(:, :)
       type(stress_parts) :: stress
+      !> Hysteretic damping, symmetric (n_dof, n_dof) [force/length].
+      real(wp), allocatable :: structural_damping(:, :)
+      !> Of any shape (n_dof, n_dof): stiffness per rotation speed, stiffness and damping.
+      real(wp), allocatable :: circulatory(:, :), stiffness_unsymmetric(:, :), &
+         damping_unsymmetric(:, :)
    contains
       procedure :: order
       procedure :: bind_parts
@@ -105,6 +110,14 @@ contains
                    self%stiffness_rotation)
       call to%bind(part('coriolis', 'dof dof', 'skew: force of velocities for each rad/s of '// &
                         'model%rotation_speed'), self%coriolis)
+      call to%bind(part('structural_damping', 'dof dof', 'hysteretic, symmetric: i times it in '// &
+                        'harmonics above 0', storage=either_way), self%structural_damping)
+      call to%bind(part('circulatory', 'dof dof', 'any: stiffness for each rad/s of '// &
+                        'model%rotation_speed; row i is the force on dof i'), self%circulatory)
+      call to%bind(part('stiffness_unsymmetric', 'dof dof', 'any: added to the stiffness'), &
+                   self%stiffness_unsymmetric)
+      call to%bind(part('damping_unsymmetric', 'dof dof', 'any: added to the damping'), &
+                   self%damping_unsymmetric)
    end subroutine bind_structure
 
    subroutine bind_pairs(pairs, to)

@@ -6,7 +6,7 @@
 module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_features, only: asks_for, feature_length, feature_text
+   use fw_features, only: asks_for, feature_length, feature_text, hysteretic, matrices_alone
    implicit none (type, external)
    private
 
@@ -133,6 +133,20 @@ module fw_rules
       rule_type('group &cyclic', "solver%kind = 'pseudo_time'", "use 'newton'"), &
       rule_type('group &cyclic', 'output%tail', 'take more n_harmonics')]
 
+   !> Matrices without a time domain, or those that this part of the program does not take.
+   type(rule_type), parameter :: of_matrices(*) = [ &
+      rule_type(hysteretic, "case%analysis = 'time'", &
+                "has no time domain: use 'frf' or 'point', or viscous damping"), &
+      rule_type(hysteretic, 'sweep%stability = .true.', &
+                'has no time domain: leave stability out, or use viscous damping'), &
+      rule_type(matrices_alone, "case%analysis = 'time'", "use 'frf' or 'point'"), &
+      rule_type(matrices_alone, "solver%kind = 'pseudo_time'", "use 'newton'"), &
+      rule_type(matrices_alone, 'output%tail', 'take more n_harmonics'), &
+      rule_type('sweep%speed_order', "case%analysis other than 'frf' or 'point'", &
+                'give model%rotation_speed'), &
+      rule_type('sweep%speed_order', 'sweep%parameter', &
+                'the speed follows the frequency: sweep over this')]
+
    !> By what the law of the pairs can do, not by its name: a new law needs no new row.
    type(rule_type), parameter :: of_laws(*) = [ &
       rule_type('a law that takes integrals between its events', &
@@ -190,8 +204,9 @@ module fw_rules
       rule_type('group &stress', "resonance%parameter = 'model%rotation_speed'", &
                 'stress without motion changes with it: give single speeds')]
 
-   type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, of_laws, &
-                                             of_elements, of_wear, of_derivatives, of_stress]
+   type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
+                                             of_matrices, of_laws, of_elements, of_wear, &
+                                             of_derivatives, of_stress]
 
 contains
 

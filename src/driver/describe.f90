@@ -60,6 +60,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       point%omega = request%omega
+      if (case%sweep%speed_order > 0.0_wp) point%speed = request%omega/case%sweep%speed_order
       point%place = request%place()
       point%load_scale = case%model%harmonic_scale*system%load_factor(static=.false.)
       point%n_harmonics = n_harmonics

@@ -87,7 +87,8 @@ contains
                               0.5_wp*n*sum(range))
          call find_modes(case%model%mass, case%model%damping, stiffness, &
                          reshape([real(load, wp), -aimag(load)], [size(load), 2]), &
-                         case%model%observe_matrix, real(n, wp)*range, found)
+                         case%model%observe_matrix, real(n, wp)*range, found, &
+                         case%model%loss_factor)
       end if
       do i = 1, size(found)
          found(i)%omega = found(i)%omega/n

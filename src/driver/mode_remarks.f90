@@ -71,7 +71,7 @@ contains
          if (n_found > 1) text = text//', '
          text = text//to_text(n)//' omega meets mode '//to_text(j)
          associate (cyclic => start%case%model%cyclic)
-            if (cyclic%is_cyclic) text = text//' of nodal diameter '// &
+            if (cyclic%has_sectors()) text = text//' of nodal diameter '// &
                                          to_text(cyclic%nodal_diameter(n))
          end associate
          if (start%problem%n_pairs > 0) text = text//' with '//kind//' pairs'

@@ -1,6 +1,7 @@
 !> What is allowed and seldom meant: it is said, in the summary and in the result, and never ends a
 !> run.
 module fw_remarks
+   use fw_body, only: body_type
    use fw_case, only: analyses, case_type
    use fw_force_law, only: law_facts
    use fw_joint_modes, only: held_stiffness, joint_mode_type, most_dofs, state_sliding
@@ -9,9 +10,11 @@ module fw_remarks
    use fw_harmonics_options, only: method_hbm, sampling_uniform
    use fw_law_text, only: law_text
    use fw_laws, only: facts_of, law_under_accuracy, law_words, is_of_high_order
-   use fw_parameters, only: modal_damping, rayleigh_mass, rayleigh_stiffness
+   use fw_parameters, only: loss_factor, modal_damping, rayleigh_mass, rayleigh_stiffness
    use fw_peak, only: found_bound, found_unresolved, peak_type
+   use fw_modes, only: mode_type
    use fw_result_group, only: group_writer, result_group
+   use fw_sector_modes, only: find_sector_modes
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_undetermined, only: undetermined_note
@@ -97,11 +100,43 @@ contains
          call remarks%add('no load', 'no vibratory load acts: the response is that at rest; '// &
                           'set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       end if
+      call remark_unstable(case, remarks)
       call remark_unused(case, remarks)
       call remark_harmonics(case, remarks)
       call remark_law(case, remarks)
       call remark_tail(case, remarks)
    end subroutine remark_input
+
+   !> Forces across the motion, of bearings or seals, may feed it.
+   subroutine remark_unstable(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      !> All frequencies [rad/s], and no held component of pairs.
+      real(wp), parameter :: all_of_them(*) = [0.0_wp, 1.0e9_wp]
+      integer, parameter :: none_held = 4
+      !> Growth of round-off, in parts of the frequency.
+      real(wp), parameter :: least = 1.0e-9_wp
+      type(body_type) :: body
+      type(mode_type), allocatable :: modes(:)
+      real(wp) :: range(2)
+      integer :: i
+
+      if (.not. case%model%cyclic%is_alone) return
+      range = case%sweep%range()
+      body%contact = case%contact
+      body%springs = case%springs
+      body%model = case%model%at_frequency(range(2))
+      if (allocated(body%model%cyclic%speed)) deallocate (body%model%cyclic%speed)
+      call find_sector_modes(body, 1, none_held, all_of_them, modes)
+      do i = 1, size(modes)
+         if (modes(i)%width >= -least*modes(i)%omega) cycle
+         call remarks%add('unstable', 'the linear structure without contact is unstable: its '// &
+            'motion of '//to_text(modes(i)%omega)//' rad/s grows by exp('// &
+            to_text(-0.5_wp*modes(i)%width)//' t); a periodic response is not seen unless '// &
+            'something else holds it')
+         return
+      end do
+   end subroutine remark_unstable
 
    !> What was given and has no effect.
    subroutine remark_unused(case, remarks)
@@ -155,9 +190,9 @@ contains
    pure logical function is_undamped(case)
       type(case_type), intent(in) :: case
 
-      is_undamped = .not. case%model%cyclic%is_cyclic
+      is_undamped = .not. (case%model%cyclic%is_cyclic .or. case%model%loss_factor > 0.0_wp)
       ! That of the case as it was read is none of the values of a sweep over it.
-      if (any(case%varied == [modal_damping, rayleigh_mass, rayleigh_stiffness])) then
+      if (any(case%varied == [modal_damping, rayleigh_mass, rayleigh_stiffness, loss_factor])) then
          is_undamped = .false.
       end if
       if (is_undamped .and. allocated(case%model%damping)) then

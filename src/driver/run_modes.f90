@@ -57,11 +57,11 @@ contains
       if (allocated(error)) return
       allocate (run%table(0))
       text = 'natural frequencies ['//trim(unit_words(case%sweep%unit))//']'
-      if (case%model%cyclic%is_cyclic) text = text//' of each nodal diameter'
+      if (case%model%cyclic%has_sectors()) text = text//' of each nodal diameter'
       call append(run%table, text)
       do j = 1, size(modes%nodal_diameter)
          name = ''
-         if (case%model%cyclic%is_cyclic) name = to_text(modes%nodal_diameter(j))//' '
+         if (case%model%cyclic%has_sectors()) name = to_text(modes%nodal_diameter(j))//' '
          call line_of(case, modes%open(:, j), -1.0_wp, huge(1.0_wp), text)
          call append(run%table, name//'open'//text)
          if (case%contact%n_pairs == 0) cycle
@@ -127,7 +127,7 @@ contains
       do j = 1, size(modes%nodal_diameter)
          call line_of(case, modes%open(:, j), range(1), range(2), text)
          name = ''
-         if (case%model%cyclic%is_cyclic) name = 'nodal diameter '//to_text( &
+         if (case%model%cyclic%has_sectors()) name = 'nodal diameter '//to_text( &
                                                  modes%nodal_diameter(j))//' '
          call append(lines, '!   '//name//'open'//text)
          if (case%contact%n_pairs == 0) cycle

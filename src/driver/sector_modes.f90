@@ -2,7 +2,7 @@
 !> linear state: what fw_joint_modes finds of other structures.
 module fw_sector_modes
    use fw_body, only: body_type
-   use fw_cyclic_data, only: nodal_matrices
+   use fw_cyclic_data, only: nodal_matrices, speed_matrices
    use fw_error, only: error_type
    use fw_hermitian, only: is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
@@ -48,7 +48,7 @@ contains
       call sector_at(case%model, k, nodal, error)
       if (allocated(error)) return
       call hold_joint(case, k, first_component, nodal%stiffness)
-      if (nodal%has_whirl()) then
+      if (nodal%has_whirl() .or. allocated(case%model%cyclic%speed)) then
          call find_waves(case, nodal, harmonic, range, modes)
          return
       end if
@@ -114,6 +114,8 @@ contains
       if (size(nodal%mass, 1) > most_whirling) return
       conjugated = case%model%cyclic%nodal_diameter(harmonic) < 0
       call wave_of(nodal, nodal%stiffness, conjugated, wave)
+      if (allocated(case%model%cyclic%speed)) call follow_speed(case%model%cyclic%speed, harmonic, &
+                                                                wave)
       call find_whirl(wave, root, right, left)
       load = load_in(nodal, harmonic, conjugated, 0.5_wp*sum(range))
       observe = nodal%observe
@@ -137,6 +139,23 @@ contains
                                                         least_width*modes(j)%omega), tiny(1.0_wp))
       end do
    end subroutine find_waves
+
+   !> Critical speeds: with lambda = i n omega and Omega = omega/p the forces of the speed are some
+   !> of lambda and of its square.
+   pure subroutine follow_speed(speed, harmonic, wave)
+      type(speed_matrices), intent(in) :: speed
+      integer, intent(in) :: harmonic
+      type(wave_matrices), intent(inout) :: wave
+      real(wp) :: np
+
+      np = harmonic*speed%order
+      if (allocated(speed%coriolis)) wave%mass = wave%mass - cmplx(0.0_wp, speed%coriolis/np, wp)
+      if (allocated(speed%circulatory)) wave%damping = wave%damping - &
+         cmplx(0.0_wp, speed%circulatory/np, wp)
+      if (allocated(speed%stiffness)) wave%mass = wave%mass - speed%stiffness/np**2
+      if (allocated(speed%structural)) wave%mass = wave%mass - &
+         cmplx(0.0_wp, speed%structural/np**2, wp)
+   end subroutine follow_speed
 
    !> Linear springs, and what the contact holds.
    subroutine hold_joint(case, k, first_component, stiffness)

@@ -58,7 +58,7 @@ contains
       allocate (y(self%system%n))
       call carry_solution(system, x, self%system, y)
       call observed_coefficients(self%system, y, n_harmonics, found)
-      call add_static(case, point%place, found)
+      call add_static(case, point, found)
       if (self%grid%n_harmonics /= n_harmonics .or. .not. allocated(self%grid%waves)) then
          self%grid = new_stress_grid(n_harmonics)
       end if
@@ -103,17 +103,18 @@ contains
    end subroutine observe_nodal_stress
 
    !> What stands there without motion, in harmonic 0 (2H+1, 6 n_points n_sectors).
-   pure subroutine add_static(case, place, coefficients)
+   pure subroutine add_static(case, point, coefficients)
       type(case_type), intent(in) :: case
-      !> Of the point: the value of what its sweep goes over.
-      real(wp), intent(in) :: place
+      type(point_type), intent(in) :: point
       real(wp), intent(inout) :: coefficients(:, :)
       real(wp) :: speed, static(size(case%stress%rows, 1))
       integer :: j, n
 
       speed = case%stress%rotation_speed
       if (case%over%number == rotation_speed) then
-         speed = merge(speed*place, place, case%over%as == as_factor)
+         speed = merge(speed, 1.0_wp, case%over%as == as_factor)*point%place
+      else if (case%sweep%speed_order > 0.0_wp) then
+         speed = point%omega/case%sweep%speed_order
       end if
       n = size(static)
       static = 0.0_wp

@@ -31,7 +31,7 @@ contains
       type(group_writer), intent(inout) :: to
       integer :: h
 
-      if (.not. cyclic%is_cyclic) return
+      if (.not. cyclic%has_sectors()) return
       call to%note('/', 'n_sectors', cyclic%n_sectors)
       if (.not. has_points) return
       call to%note('/', 'engine_order', cyclic%engine_order)

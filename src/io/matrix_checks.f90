@@ -7,7 +7,7 @@ module fw_matrix_checks
    implicit none (type, external)
    private
 
-   public :: check_matrix, check_skew, check_vector
+   public :: check_entries, check_matrix, check_skew, check_vector
 
    !> Entries of a symmetric matrix may differ by this share of the largest one: room for a
    !> matrix written with ten digits or more.

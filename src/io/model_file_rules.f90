@@ -84,8 +84,9 @@ contains
       type(cyclic_parts), intent(inout) :: parts
       logical, intent(out) :: conjugates
       type(error_type), allocatable, intent(out) :: error
-      character(*), parameter :: others(*) = [character(19) :: '/mass', '/stiffness', '/damping', &
-         '/stiffness_rotation', '/coriolis', '/cyclic/left', '/cyclic/right']
+      character(*), parameter :: others(*) = [character(22) :: '/mass', '/stiffness', '/damping', &
+         '/stiffness_rotation', '/coriolis', '/structural_damping', '/circulatory', &
+         '/stiffness_unsymmetric', '/damping_unsymmetric', '/cyclic/left', '/cyclic/right']
       character(:), allocatable :: phase
       integer :: i
 

@@ -68,13 +68,13 @@ contains
 
       if (number == harmonic_scale) then
          if (.not. abs(model%harmonic_scale) > 0.0_wp) reason = 'load%harmonic_scale is 0'
-         if (model%cyclic%is_cyclic .or. allocated(reason)) return
+         if (model%cyclic%has_sectors() .or. allocated(reason)) return
          if (.not. (acts(model%load_cosine) .or. acts(model%load_sine))) then
             if (.not. allocated(model%load_wave)) reason = 'there is no vibratory load'
          end if
       else if (number == static_scale) then
          if (.not. abs(model%static_scale) > 0.0_wp) reason = 'load%static_scale is 0'
-         if (model%cyclic%is_cyclic .or. allocated(reason)) return
+         if (model%cyclic%has_sectors() .or. allocated(reason)) return
          if (.not. acts(model%load_static)) reason = 'there is no static load'
       end if
    end subroutine check_of_loads
@@ -138,7 +138,10 @@ contains
       integer, intent(in) :: number
       character(:), allocatable, intent(out) :: reason
 
-      if (case%model%cyclic%is_cyclic) then
+      if (case%model%cyclic%is_alone) then
+         reason = 'matrices that are not symmetric, or structural_damping, are not served with '// &
+                  'it yet: run value by value'
+      else if (case%model%cyclic%is_cyclic) then
          reason = 'matrices of a cyclic structure (&cyclic) are not served yet'
       else if (number == rotation_speed .and. .not. case%model%rotates) then
          reason = 'the model has no stiffness_rotation and no load static_rotation'

@@ -15,9 +15,9 @@ module fw_point_quantities
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
-      follows_parameter, goes_over, has_dampers, has_endurance, has_levels, has_stress, &
-      has_tensor, is_accurate, is_controlled, is_mission, is_mode, is_response, scales_load, &
-      shows_contact, wears
+      follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, has_levels, &
+      has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
+      is_response, scales_load, shows_contact, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -125,6 +125,9 @@ contains
                shows_contact)
       call add('damper/dissipation', r, '<energy>', 'point dampers', 'energy that each damper '// &
                'takes per cycle', has_dampers)
+      call add('structural/dissipation', r, '<energy>', 'point', &
+               'work of hysteretic damping per cycle', has_structural)
+      call add('speed', r, 'rad/s', 'point', 'rotation speed', follows_speed)
       call add('history/observed', r, '<length>', 'point instant observed', &
                'observed quantities over one period', always)
       call add('history/force', r, '<force>', 'point instant pair direction', &
@@ -394,6 +397,10 @@ contains
          if (.not. allocated(point%work_of)) return
          k = element_kind('damper')
          if (allocated(point%work_of(k)%values)) values = point%work_of(k)%values
+      case ('structural/dissipation')
+         values = [point%structural_work]
+      case ('speed')
+         values = [point%speed]
       case ('history/observed')
          call by_rows(point%history, values)
       case ('history/force')

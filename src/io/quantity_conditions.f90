@@ -2,15 +2,15 @@
 module fw_quantity_conditions
    use fw_case, only: analyses, case_type
    use fw_kinds, only: wp
-   use fw_parameters, only: harmonic_scale
+   use fw_parameters, only: harmonic_scale, loss_factor
    use fw_solver_options, only: continuation_arclength
    implicit none (type, external)
    private
 
    public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
-             goes_over, has_dampers, has_endurance, has_levels, has_stress, has_tensor, &
-             is_accurate, is_controlled, is_mission, is_mode, is_response, scales_load, &
-             shows_contact, wears
+             follows_speed, goes_over, has_dampers, has_endurance, has_levels, has_stress, &
+             has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
+             is_response, scales_load, shows_contact, wears
 
 contains
 
@@ -73,6 +73,24 @@ contains
 
       follows_parameter = follows_branch(case) .and. case%over%is_wanted()
    end function follows_parameter
+
+   !> Where the rotation speed follows the frequency.
+   pure logical function follows_speed(case)
+      type(case_type), intent(in) :: case
+
+      follows_speed = case%sweep%speed_order > 0.0_wp
+   end function follows_speed
+
+   !> Hysteretic damping of one sector or of a structure that is none.
+   pure logical function has_structural(case)
+      type(case_type), intent(in) :: case
+
+      associate (cyclic => case%model%cyclic)
+         has_structural = .not. cyclic%is_mistuned .and. &
+                          (case%model%loss_factor > 0.0_wp .or. allocated(cyclic%structural) .or. &
+                           cyclic%loss_factor > 0.0_wp .or. case%varied == loss_factor)
+      end associate
+   end function has_structural
 
    !> A sweep over another parameter than the frequency.
    pure logical function goes_over(case)

@@ -18,7 +18,7 @@ module fw_read_case
    use fw_read_elements, only: read_contact, read_elements, read_springs
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_mission, only: read_mission
-   use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model
+   use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model, stand_alone
    use fw_read_options, only: read_harmonics, read_mode, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
@@ -278,6 +278,7 @@ contains
       if (allocated(raw%unread)) case%unread = raw%unread
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep, case%over)
+      if (.not. reader%failed()) call check_order(reader, case)
       if (.not. reader%failed()) call vary_matrices(case, error)
       if (allocated(error)) return
       call case%solver%bind_keys(reader)
@@ -292,6 +293,18 @@ contains
       call read_observed(reader, raw, case%model)
       call read_control(reader, case%model, case%control)
    end subroutine read_keys
+
+   !> What the model was formed by is what the key has.
+   subroutine check_order(reader, case)
+      type(reader_type), intent(inout) :: reader
+      type(case_type), intent(in) :: case
+      real(wp) :: order
+
+      order = 0.0_wp
+      if (allocated(case%model%cyclic%speed)) order = case%model%cyclic%speed%order
+      if (abs(order - case%sweep%speed_order) > 0.0_wp) call reader%refuse('sweep', 'speed_order', &
+         'must be a plain number')
+   end subroutine check_order
 
    !> Matrices that change from point to point: what they are formed from is kept, and the values
    !> that they are to serve. Nothing is kept of others.
@@ -356,6 +369,20 @@ contains
       end do
    end subroutine list_inputs
 
+   !> The key of the group that is read behind the model, which is formed by it; 0 where it is no
+   !> number, which is told then.
+   real(wp) function speed_order_of(reader) result(order)
+      type(reader_type), intent(in) :: reader
+      character(:), allocatable :: text
+      integer :: stat
+
+      text = reader%text_of('sweep', 'speed_order')
+      order = 0.0_wp
+      if (len(text) == 0) return
+      read (text, *, iostat=stat) order
+      if (stat /= 0 .or. .not. (order > 0.0_wp .and. order <= huge(1.0_wp))) order = 0.0_wp
+   end function speed_order_of
+
    !> The model with its contact, springs and loads.
    subroutine read_structure(reader, path, case, raw, error, memory_model)
       type(reader_type), intent(inout) :: reader
@@ -375,6 +402,8 @@ contains
       if (allocated(error)) return
       call read_cyclic(reader, raw%cyclic, n_dof, analyses(case%analysis)%has_points, &
                        case%model%cyclic)
+      options%speed_order = speed_order_of(reader)
+      call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
       call read_worn(reader, directory_of(path), case%contact, worn, error)

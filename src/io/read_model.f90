@@ -4,16 +4,17 @@
 !> The source is chosen first, because it decides which other keys may be given. `raw` collects the
 !> parts from whatever source; finish_model checks them and adds rotation and damping.
 module fw_read_model
+   use fw_cyclic_data, only: cyclic_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_hdf5, only: has_attribute, hdf5_file, read_attribute
    use fw_load_terms, only: load_terms
-   use fw_matrix_checks, only: check_matrix, check_skew, check_vector
+   use fw_matrix_checks, only: check_entries, check_matrix, check_skew, check_vector
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: read_model_hdf5
    use fw_raw_model, only: raw_model
-   use fw_model_forming, only: finish_structure, form_matrices, model_origin
+   use fw_model_forming, only: finish_structure, form_matrices, goes_alone, model_origin
    use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads, source_words, &
       source_inline, source_hdf5, source_matrix_market, source_memory
    use fw_paths, only: resolve_path
@@ -26,7 +27,7 @@ module fw_read_model
    implicit none (type, external)
    private
 
-   public :: read_model, read_loads, finish_model, find_unit_system
+   public :: read_model, read_loads, finish_model, find_unit_system, stand_alone
 
    !> HDF5 can crash over a damaged file: reading is tried in a process of its own first.
    type, extends(trial_type) :: model_trial
@@ -188,7 +189,8 @@ contains
       type(raw_model), intent(inout) :: raw
       !> Not beside a file whose source is missing: that is said, and is enough.
       logical, intent(in) :: needed
-      real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
+      real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :), structural(:, :)
+      real(wp), allocatable :: circulatory(:, :), more_stiffness(:, :), more_damping(:, :)
       integer :: n_file
 
       n_file = n_dof
@@ -197,10 +199,15 @@ contains
          call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model has '// &
                             to_text(n_file)//' dofs; remove n_dof')
       end if
-      call bind_matrices(reader, needed, mass, stiffness, damping)
+      call bind_matrices(reader, needed, mass, stiffness, damping, structural, circulatory, &
+                         more_stiffness, more_damping)
       call take('mass', mass, raw%mass)
       call take('stiffness', stiffness, raw%stiffness)
       call take('damping', damping, raw%damping)
+      call take('structural_damping', structural, raw%structural_damping)
+      call take('circulatory', circulatory, raw%circulatory)
+      call take('stiffness_unsymmetric', more_stiffness, raw%stiffness_unsymmetric)
+      call take('damping_unsymmetric', more_damping, raw%damping_unsymmetric)
 
    contains
 
@@ -247,6 +254,7 @@ contains
       real(wp) :: static(raw%order())
 
       if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
+      if (options%speed_order > 0.0_wp) call check_speed_order(reader, options, raw, model)
       call take_whirl(reader, options, raw, model)
       call gather_waves(reader, raw, terms, model%cyclic, size(static), model%waves, &
                         model%load_wave, static)
@@ -284,13 +292,56 @@ contains
       real(wp), intent(in) :: speed
       type(raw_model), intent(in) :: raw
 
-      if (speed <= 0.0_wp) return
-      if (allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation) .or. &
-          allocated(raw%coriolis)) return
+      if (speed <= 0.0_wp .or. rotates(raw)) return
       call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
-                         'stiffness_rotation, no coriolis and no load static_rotation: remove '// &
-                         'it, or use a model file that holds them')
+                         'stiffness_rotation, no coriolis, no circulatory and no load '// &
+                         'static_rotation: remove it, or use a model file that holds them')
    end subroutine check_rotation
+
+   !> A speed that follows the frequency.
+   subroutine check_speed_order(reader, options, raw, model)
+      type(reader_type), intent(inout) :: reader
+      type(model_options), intent(in) :: options
+      type(raw_model), intent(in) :: raw
+      type(model_type), intent(in) :: model
+      character(:), allocatable :: reason
+
+      if (options%rotation_speed > 0.0_wp) then
+         reason = 'does not go with model%rotation_speed: the speed follows the frequency; '// &
+                  'keep one of the two'
+      else if (model%cyclic%has_sectors()) then
+         reason = 'does not go with &cyclic: give model%rotation_speed, speed by speed'
+      else if (.not. rotates(raw)) then
+         reason = 'is given, but nothing of the model depends on the rotation speed '// &
+                  '(stiffness_rotation, coriolis, circulatory, load static_rotation): remove it'
+      else if (options%modal_damping > 0.0_wp .and. allocated(raw%stiffness_rotation)) then
+         reason = 'does not go with model%modal_damping, whose modes would change with '// &
+                  'stiffness_rotation: give damping, or rayleigh_stiffness'
+      end if
+      if (allocated(reason)) call reader%refuse('sweep', 'speed_order', reason)
+   end subroutine check_speed_order
+
+   !> Whether anything depends on the rotation speed.
+   pure logical function rotates(raw)
+      type(raw_model), intent(in) :: raw
+
+      rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation) .or. &
+                allocated(raw%coriolis) .or. allocated(raw%circulatory)
+   end function rotates
+
+   !> A model that is no sector becomes the only one where its matrices ask for it.
+   subroutine stand_alone(options, raw, cyclic)
+      type(model_options), intent(in) :: options
+      type(raw_model), intent(in) :: raw
+      type(cyclic_type), intent(inout) :: cyclic
+
+      if (cyclic%is_cyclic) return
+      cyclic%is_alone = goes_alone(options, raw)
+      if (.not. cyclic%is_alone) return
+      cyclic%is_cyclic = .true.
+      cyclic%n_sectors = 1
+      cyclic%engine_order = 0
+   end subroutine stand_alone
 
    !> Coriolis forces at speed and forces of the air, which cyclic structures have.
    subroutine take_whirl(reader, options, raw, model)
@@ -300,13 +351,6 @@ contains
       type(model_type), intent(inout) :: model
       character(:), allocatable :: message
 
-      if (.not. model%cyclic%is_cyclic .and. &
-          (allocated(raw%coriolis) .or. allocated(raw%cyclic%air))) then
-         call reader%refuse_model('a coriolis or aero part, which goes with sectors: give '// &
-                                  '&cyclic, with n_sectors = 1 and engine_order = 0 for a '// &
-                                  'structure that is no sector')
-         return
-      end if
       if (allocated(raw%cyclic%air)) model%cyclic%air = raw%cyclic%air
       if (.not. allocated(raw%coriolis)) return
       call check_skew(raw%coriolis, raw%order(), message)
@@ -333,6 +377,12 @@ contains
       if (allocated(raw%stiffness_rotation)) then
          call check_one('stiffness_rotation', raw%stiffness_rotation)
       end if
+      if (allocated(raw%structural_damping)) then
+         call check_one('structural_damping', raw%structural_damping)
+      end if
+      call check_any('circulatory', raw%circulatory)
+      call check_any('stiffness_unsymmetric', raw%stiffness_unsymmetric)
+      call check_any('damping_unsymmetric', raw%damping_unsymmetric)
       if (.not. allocated(raw%load_static_rotation)) return
       call check_vector(raw%load_static_rotation, n_dof, message)
       if (allocated(message)) then
@@ -348,13 +398,31 @@ contains
          character(:), allocatable :: message
 
          call check_matrix(matrix, n_dof, key == 'mass', message)
+         call blame(key, message)
+      end subroutine check_one
+
+      !> A matrix of any shape, which may not be there.
+      subroutine check_any(key, matrix)
+         character(*), intent(in) :: key
+         real(wp), allocatable, intent(in) :: matrix(:, :)
+         character(:), allocatable :: message
+
+         if (.not. allocated(matrix)) return
+         call check_entries(matrix, n_dof, message)
+         call blame(key, message)
+      end subroutine check_any
+
+      subroutine blame(key, message)
+         character(*), intent(in) :: key
+         character(:), allocatable, intent(in) :: message
+
          if (.not. allocated(message)) return
          if (is_inline) then
             call reader%refuse('model', key, message)
          else
             call reader%refuse_model('a '//key//' that '//message)
          end if
-      end subroutine check_one
+      end subroutine blame
 
    end subroutine check_parts
 

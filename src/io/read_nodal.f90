@@ -48,6 +48,7 @@ contains
          end associate
       end do
       call stand_in(options, raw, model)
+      model%cyclic%loss_factor = options%loss_factor
    end subroutine finish_nodal
 
    !> Loads of other harmonics, on the displacements in front.

@@ -166,7 +166,7 @@ contains
       type(reader_type), intent(inout) :: reader
       character(*), parameter :: keys(*) = [character(12) :: 'parameter', 'values', 'start', &
                                             'end', 'unit', 'continuation', 'n_points', &
-                                            'max_points', 'stability', 'refine']
+                                            'max_points', 'stability', 'speed_order', 'refine']
       integer :: i
 
       do i = 1, size(keys)

@@ -23,13 +23,12 @@ module fw_strangers
 
    character(*), parameter :: of_air = 'forces of the air do not depend on frequency here: '// &
       'give those of the frequency that matters as /aero/sector/M or /aero/nodal_diameter/K'
-   character(*), parameter :: of_damping = 'damping is viscous here: give /damping, or '// &
-      'model%modal_damping in the case'
+   character(*), parameter :: of_damping = 'give the matrix as /structural_damping, or '// &
+      'model%loss_factor in the case'
 
    type(not_offered_type), parameter :: not_offered(*) = [ &
       not_offered_type('aero/frequency', of_air), &
       not_offered_type('aero/matrix', of_air), &
-      not_offered_type('structural_damping', of_damping), &
       not_offered_type('hysteretic_damping', of_damping), &
       not_offered_type('gyroscopic', 'give the matrix for each rad/s as /coriolis')]
 

@@ -18,6 +18,7 @@ module fw_all_sectors
    use fw_ring_fft, only: ring_fft
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
+   use fw_sector_uncondensed, only: add_uncondensed
    use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, slopes_of
    use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_operator, &
       structure_state
@@ -226,6 +227,8 @@ contains
          if (is_mirrored(self, k, state%point(k + 1, h))) cycle
          call form_sector(self%basis(basis_of(self, k)), state%point(k + 1, h), &
                           state%wave(:, :, k + 1, h), load, failed)
+         if (self%harmonic(h) == 0) call add_uncondensed(self%basis(basis_of(self, k)), 0, 2*k > &
+            self%n_alike, 0.0_wp, state%wave(:, :, k + 1, h), load)
          if (failed) n_failed = n_failed + 1
          if (state%point(k + 1, h)%is_loaded) loads(:, h) = load
       end do

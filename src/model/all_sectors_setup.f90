@@ -59,13 +59,18 @@ contains
             call self%basis(k + 1)%find_modes(k, nodal(k + 1), relative%at(k + 1), error)
          end if
          if (.not. allocated(error) .and. k == 0) then
-            if (self%basis(1)%pushes_free_mode(nodal(1))) call fatal_error(error, &
+            if (self%basis(1)%pushes_free_mode(nodal(1)) .and. &
+                .not. allocated(nodal(1)%circulatory)) call fatal_error(error, &
                '&load static pushes a part of the sectors that neither stiffness nor contact '// &
                'holds; hold it or remove the load', status_input)
          end if
          if (allocated(error)) return
-         call self%basis(k + 1)%keep_resonances(self%harmonic, omega_range, &
-                                                nodal(k + 1)%has_whirl())
+         if (allocated(nodal(k + 1)%circulatory)) then
+            call self%basis(k + 1)%keep_all()
+         else
+            call self%basis(k + 1)%keep_resonances(self%harmonic, omega_range, &
+                                                   nodal(k + 1)%has_whirl(), nodal(k + 1))
+         end if
          n_kept = max(n_kept, size(self%basis(k + 1)%kept))
       end do
       call number_coordinates(relative%n_coordinates, n_kept, self)

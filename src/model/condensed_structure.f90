@@ -1,7 +1,7 @@
 !> A structure condensed to its relative coordinates, in whatever form its products are taken:
 !> what follows from the basis (fw_reduction) and from the factors of a frequency alone.
 module fw_condensed_structure
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_complex_form, only: coefficients_of
    use fw_field_slopes, only: follow_frequency, work_of_load
    use fw_formed_stiffness, only: harmonic_load
@@ -30,6 +30,7 @@ module fw_condensed_structure
       procedure :: magnitudes
       procedure :: observed_slope
       procedure :: load_work
+      procedure :: structural_work
       procedure :: whole_size
       procedure :: condense_field
       procedure :: complete_field
@@ -124,14 +125,17 @@ contains
       matrix = self%basis%blocks(:self%n_coordinates, :, 2)
    end subroutine mass
 
-   !> The same in all harmonics.
+   !> The same in all harmonics, but for hysteretic damping with the stiffness.
    pure subroutine parts(self, h, stiffness, mass, damping, observe)
       class(condensed_structure), intent(in) :: self
       integer, intent(in) :: h
       complex(wp), intent(out) :: stiffness(:, :), mass(:, :), damping(:, :), observe(:, :)
 
-      associate (unused => h, m => self%n_coordinates, b => self%basis)
+      associate (m => self%n_coordinates, b => self%basis)
          stiffness = cmplx(b%blocks(:m, :, 1), kind=wp)
+         if (self%harmonic(h) > 0 .and. b%loss > 0.0_wp) then
+            stiffness = cmplx(1.0_wp, b%loss, wp)*stiffness
+         end if
          mass = cmplx(b%blocks(:m, :, 2), kind=wp)
          damping = (0.0_wp, 0.0_wp)
          if (b%n_blocks == 3) damping = cmplx(b%blocks(:m, :, 3), kind=wp)
@@ -150,6 +154,7 @@ contains
          vibrates = b%k_i > 0.0_wp .and. b%m_i > 0.0_wp
          frequency = sqrt(pack(b%k_i, vibrates)/pack(b%m_i, vibrates))
          half_width = 0.5_wp*pack(b%c_i, vibrates)/pack(b%m_i, vibrates)
+         if (b%loss > 0.0_wp) half_width = half_width + 0.5_wp*b%loss*frequency
       end associate
    end subroutine held_modes
 
@@ -260,9 +265,13 @@ contains
       associate (b => self%basis)
          slope = matmul(b%change_k(:, :, number), field)
          do h = 1, size(self%harmonic)
-            if (self%harmonic(h) == 0) then
+            if (b%change_loss(number)) then
+               slope(:, h) = merge((0.0_wp, 1.0_wp), (0.0_wp, 0.0_wp), self%harmonic(h) > 0)* &
+                             slope(:, h)
+            else if (self%harmonic(h) == 0) then
                slope(:, h) = slope(:, h) - state%load_factor(h)*b%change_load(:, number)
             else
+               if (b%loss > 0.0_wp) slope(:, h) = cmplx(1.0_wp, b%loss, wp)*slope(:, h)
                slope(:, h) = slope(:, h) + cmplx(0.0_wp, self%harmonic(h)*state%omega, wp)* &
                              matmul(b%change_c(:, :, number), field(:, h))
             end if
@@ -301,6 +310,30 @@ contains
       call work_of_load(self%basis, self%harmonic(h), state%omega, state%load_factor(h), q, work, &
                         slope, row)
    end subroutine load_work
+
+   !> eta sum n pi U^H K U.
+   real(wp) function structural_work(self, state, q) result(work)
+      class(condensed_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp) :: field(self%n_coordinates + self%basis%n_internal, size(self%harmonic))
+      integer :: h
+
+      work = 0.0_wp
+      if (self%basis%loss <= 0.0_wp) return
+      call self%complete_field(state, q, field=field)
+      associate (b => self%basis, m => self%n_coordinates)
+         do h = 1, size(self%harmonic)
+            associate (u => field(:m, h), x => field(m + 1:, h))
+               work = work + self%harmonic(h)*( &
+                      real(dot_product(u, matmul(b%blocks(:m, :, 1), u)), wp) + &
+                      2.0_wp*real(dot_product(x, matmul(b%blocks(m + 1:, :, 1), u)), wp) + &
+                      sum(b%k_i*abs(x)**2))
+            end associate
+         end do
+      end associate
+      work = pi*self%basis%loss*work
+   end function structural_work
 
    !> Work of the loads on a motion of all degrees of freedom.
    pure complex(wp) function field_work(self, state, field) result(work)

@@ -9,7 +9,7 @@ module fw_cyclic_data
    implicit none (type, external)
    private
 
-   public :: cyclic_type, nodal_matrices, influence_type
+   public :: cyclic_type, nodal_matrices, influence_type, speed_matrices
 
    !> The sector tied to its neighbours, as it moves in one nodal diameter.
    type :: nodal_matrices
@@ -23,12 +23,19 @@ module fw_cyclic_data
       !> What the columns of the loads are.
       type(load_waves) :: waves
       !> Coriolis matrix times the rotation speed, skew-Hermitian (n, n), where there is one.
+      !> With it stands the skew part of an unsymmetric damping.
       complex(wp), allocatable :: coriolis(:, :)
       !> Stiffness of the air, for the wave of this nodal diameter and for the one the other way, in
       !> the coordinates of each (n, n, 2), where there is one: neither Hermitian nor conjugates.
+      !> Hysteretic damping i D is in it, which harmonic 0 does not have either, and the skew part
+      !> of the stiffness.
       complex(wp), allocatable :: aero(:, :, :)
+      !> The latter, which harmonic 0 has too (n, n), and D (n, n), where there are any.
+      complex(wp), allocatable :: circulatory(:, :), structural(:, :)
    contains
       procedure :: has_whirl
+      procedure :: add_structural
+      procedure :: add_circulatory
    end type nodal_matrices
 
    !> Forces of the air by the motion of the sectors, linear in it: on sector 0 by that of sector m,
@@ -46,8 +53,23 @@ module fw_cyclic_data
       real(wp), allocatable :: modes(:, :)
    end type influence_type
 
+   !> What a rotation speed Omega that follows the frequency adds to the matrices and to the static
+   !> load: Omega (G u' + R u) + Omega**2 (K_r u - f_r), with the damping that follows K_r.
+   type :: speed_matrices
+      !> Frequency over speed; 0: the speed does not follow.
+      real(wp) :: order = 0.0_wp
+      !> G and R (n_dof, n_dof).
+      real(wp), allocatable :: coriolis(:, :), circulatory(:, :)
+      !> K_r, the damping in proportion to it, and its hysteretic damping (n_dof, n_dof).
+      real(wp), allocatable :: stiffness(:, :), damping(:, :), structural(:, :)
+      !> f_r (n_dof).
+      real(wp), allocatable :: load(:)
+   end type speed_matrices
+
    type :: cyclic_type
       logical :: is_cyclic = .false.
+      !> Whether it is so for its matrices alone: one sector, which no neighbour has.
+      logical :: is_alone = .false.
       integer :: n_sectors = 1
       integer :: engine_order = 0
       !> Whether contact differs from sector to sector, and the motion of all of them is looked for.
@@ -63,14 +85,20 @@ module fw_cyclic_data
       !> In place of the matrices of a sector: those of nodal diameter k at place k + 1. What is
       !> not given is not allocated there.
       type(nodal_matrices), allocatable :: nodal(:)
-      !> Of a sector: Coriolis matrix times the rotation speed, skew (n_dof, n_dof).
-      real(wp), allocatable :: coriolis(:, :)
+      !> Of a sector: Coriolis matrix times the rotation speed and skew part of the damping, skew
+      !> part of the stiffness, and the matrix of hysteretic damping (n_dof, n_dof).
+      real(wp), allocatable :: coriolis(:, :), circulatory(:, :), structural(:, :)
+      !> Hysteretic damping of matrices of nodal diameters, in proportion to their stiffness.
+      real(wp) :: loss_factor = 0.0_wp
+      !> What follows the frequency.
+      type(speed_matrices), allocatable :: speed
       !> Forces of the air; not allocated where there are none.
       type(influence_type), allocatable :: air
    contains
       procedure :: nodal_diameter
       procedure :: factor
       procedure :: has_nodal
+      procedure :: has_sectors
       procedure :: holds
       procedure :: air_stiffness
       procedure :: splits_waves
@@ -131,6 +159,13 @@ contains
       has_nodal = allocated(self%nodal)
    end function has_nodal
 
+   !> Whether sectors stand around an axis: not of a structure that goes this way for its matrices.
+   elemental logical function has_sectors(self)
+      class(cyclic_type), intent(in) :: self
+
+      has_sectors = self%is_cyclic .and. .not. self%is_alone
+   end function has_sectors
+
    !> Whether the model holds what nodal diameter k = 0 .. N/2 needs.
    pure logical function holds(self, k)
       class(cyclic_type), intent(in) :: self
@@ -149,12 +184,49 @@ contains
       has_whirl = allocated(self%coriolis) .or. allocated(self%aero)
    end function has_whirl
 
+   !> Add hysteretic damping i D, D being Hermitian, to what the waves in both directions feel.
+   pure subroutine add_structural(self, matrix)
+      class(nodal_matrices), intent(inout) :: self
+      complex(wp), intent(in) :: matrix(:, :)
+      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+
+      call add_to_waves(self, i*matrix, i*conjg(matrix))
+      if (.not. allocated(self%structural)) then
+         self%structural = matrix
+      else
+         self%structural = self%structural + matrix
+      end if
+   end subroutine add_structural
+
+   !> Add the skew part of a stiffness.
+   pure subroutine add_circulatory(self, matrix)
+      class(nodal_matrices), intent(inout) :: self
+      complex(wp), intent(in) :: matrix(:, :)
+
+      call add_to_waves(self, matrix, conjg(matrix))
+      self%circulatory = matrix
+   end subroutine add_circulatory
+
+   !> Add to what the wave of this nodal diameter feels, and that the other way.
+   pure subroutine add_to_waves(self, forward, backward)
+      class(nodal_matrices), intent(inout) :: self
+      complex(wp), intent(in) :: forward(:, :), backward(:, :)
+
+      if (.not. allocated(self%aero)) then
+         allocate (self%aero(size(forward, 1), size(forward, 2), 2), source=(0.0_wp, 0.0_wp))
+      end if
+      self%aero(:, :, 1) = self%aero(:, :, 1) + forward
+      self%aero(:, :, 2) = self%aero(:, :, 2) + backward
+   end subroutine add_to_waves
+
    !> The same of the whole model.
    pure logical function splits_waves(self)
       class(cyclic_type), intent(in) :: self
       integer :: k
 
-      splits_waves = allocated(self%coriolis) .or. allocated(self%air)
+      splits_waves = allocated(self%coriolis) .or. allocated(self%air) .or. &
+                     allocated(self%circulatory) .or. (self%is_alone .and. &
+                                                       allocated(self%structural))
       if (splits_waves .or. .not. allocated(self%nodal)) return
       splits_waves = any([(allocated(self%nodal(k)%coriolis), k=1, size(self%nodal))])
    end function splits_waves

@@ -16,6 +16,8 @@ module fw_cyclic_structure
    use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, &
       observed_sector_slope, recover_sector, slopes_of, work_of_sector
    use fw_size_options, only: sizes
+   use fw_sector_uncondensed, only: add_speed_slope, add_uncondensed
+   use fw_sector_work, only: structural_work_of
    use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_operator, &
       structure_state
    use fw_text, only: to_text
@@ -59,6 +61,7 @@ module fw_cyclic_structure
       procedure :: magnitudes
       procedure :: observed_slope
       procedure :: load_work
+      procedure :: structural_work
    end type cyclic_structure
 
    type, extends(structure_state) :: cyclic_state
@@ -95,7 +98,8 @@ contains
       self%n_observed = size(model%observe_matrix, 1)
       call find_bases(model, relative, omega_range, keeps_first, self, error)
       if (allocated(error)) return
-      call find_norms(self)
+      ! With a speed that follows the frequency they would be those of one.
+      if (.not. allocated(model%cyclic%speed)) call find_norms(self)
       call self%means%take(model, relative, means, self%basis, error)
    end subroutine new_cyclic_structure
 
@@ -129,13 +133,21 @@ contains
       do j = 1, size(used)
          call require_diameter(model, self, used(j), error)
          if (.not. allocated(error)) call sector_at(model, used(j), nodal(j), error)
-         if (.not. allocated(error)) then
-            call self%basis(j)%find_modes(used(j), nodal(j), relative%at(used(j) + 1), error)
+         if (allocated(error)) return
+         if (allocated(model%cyclic%speed)) then
+            call self%basis(j)%keep_dofs(used(j), size(nodal(j)%mass, 1), relative%at(used(j) + 1))
+            call self%basis(j)%take_speed(model%cyclic%speed)
+            cycle
          end if
+         call self%basis(j)%find_modes(used(j), nodal(j), relative%at(used(j) + 1), error)
          if (.not. allocated(error) .and. used(j) == 0) then
             call check_free_modes(self%basis(j), nodal(j), error)
          end if
          if (allocated(error)) return
+         if (allocated(nodal(j)%circulatory)) then
+            call self%basis(j)%keep_all()
+            cycle
+         end if
          if (keeps_first) then
             call self%basis(j)%keep_of_mode(any(self%harmonic == 1 .and. self%basis_of == j), &
                                             reach_of_mode*omega_range(2)* &
@@ -144,7 +156,7 @@ contains
             cycle
          end if
          call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range, &
-                                            nodal(j)%has_whirl())
+                                            nodal(j)%has_whirl(), nodal(j))
       end do
       self%n_coordinates = self%n_relative + sum([(size(self%basis(j)%kept), j=1, size(used))])
       allocate (self%kept(0))
@@ -221,6 +233,8 @@ contains
       type(nodal_matrices), intent(in) :: nodal
       type(error_type), allocatable, intent(out) :: error
 
+      ! Forces across a motion may hold it.
+      if (allocated(nodal%circulatory)) return
       if (.not. basis%pushes_free_mode(nodal)) return
       call fatal_error(error, '&load static pushes a part of the sectors that neither '// &
                        'stiffness nor contact holds; hold it or remove the load', status_input)
@@ -260,7 +274,7 @@ contains
       type is (cyclic_state)
          state%point%s = self%harmonic*omega
          state%point%theta = cmplx(state%point%s**2, state%point%s*self_excitation, wp)
-         if (self%n_coordinates > 0) call form_all(self, state, n_failed)
+         if (self%n_coordinates > 0) call form_all(self, state, omega, n_failed)
          call state%scale_loads()
          state%restricted = .false.
       end select
@@ -274,20 +288,23 @@ contains
       state%self_excitation = self_excitation
    end subroutine at
 
-   subroutine form_all(self, state, n_failed)
+   subroutine form_all(self, state, omega, n_failed)
       class(cyclic_structure), intent(in) :: self
       type(cyclic_state), intent(inout) :: state
+      real(wp), intent(in) :: omega
       integer, intent(inout) :: n_failed
       logical :: failed
       integer :: h
 
-      !$omp parallel do default(none) shared(self, state) private(h, failed) &
+      !$omp parallel do default(none) shared(self, state, omega) private(h, failed) &
       !$omp reduction(+:n_failed) schedule(dynamic) &
       !$omp if(self%n_coordinates >= coordinates_for_threads)
       do h = 1, size(self%harmonic)
          call form_sector(self%basis(self%basis_of(h)), state%point(h), &
                           state%formed%matrix(:, :, h), state%unit_load(:, h), failed)
          if (failed) n_failed = n_failed + 1
+         call add_uncondensed(self%basis(self%basis_of(h)), self%harmonic(h), self%conjugated(h), &
+                              omega, state%formed%matrix(:, :, h), state%unit_load(:, h))
       end do
       !$omp end parallel do
    end subroutine form_all
@@ -432,6 +449,10 @@ contains
             call derive_sector(self%basis(self%basis_of(h)), state%point(h), &
                                slopes_of(state%point(h), state%self_excitation, parameter), &
                                state%load_factor(h), amplitude(:, h), slopes(:, h))
+            if (parameter /= by_frequency) cycle
+            if (allocated(self%basis(self%basis_of(h))%speed)) call add_speed_slope( &
+               self%basis(self%basis_of(h))%speed, self%harmonic(h), state%omega, &
+               state%load_factor(h), amplitude(:, h), slopes(:, h))
          end do
       end select
       call coefficients_of(self%harmonic, self%column, m, m, slopes, slope)
@@ -540,6 +561,11 @@ contains
             sums = sums + (abs(b(:m, j, 1)) + theta*abs(b(:m, j, 2)))*amplitude(j)
          end do
       end associate
+      associate (b => self%basis(self%basis_of(h)))
+         if (.not. allocated(b%speed)) return
+         if (allocated(b%speed%stiffness)) sums = sums + (state%omega/b%speed%order)**2* &
+            matmul(abs(b%speed%stiffness), amplitude(:m))
+      end associate
    end subroutine magnitudes
 
    subroutine observed_slope(self, state, q, slope)
@@ -576,5 +602,22 @@ contains
                              state%load_factor(h), q, work, slope, row)
       end select
    end subroutine load_work
+
+   !> Of one sector.
+   real(wp) function structural_work(self, state, q) result(work)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      integer :: h
+
+      work = 0.0_wp
+      select type (state)
+      type is (cyclic_state)
+         do h = 1, size(self%harmonic)
+            work = work + structural_work_of(self%basis(self%basis_of(h)), state%point(h), &
+                                             state%omega, state%load_factor(h), q(:, h))
+         end do
+      end select
+   end function structural_work
 
 end module fw_cyclic_structure

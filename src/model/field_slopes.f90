@@ -60,6 +60,9 @@ contains
          if (basis%n_blocks == 3) then
             coupling = coupling + cmplx(0.0_wp, s, wp)*basis%blocks(m + 1:, :, 3)
          end if
+         if (basis%loss_at(s) > 0.0_wp) then
+            coupling = coupling + cmplx(0.0_wp, k*basis%loss, wp)*basis%blocks(m + 1:, :, 1)
+         end if
       end associate
    end function coupling
 

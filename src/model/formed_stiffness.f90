@@ -78,7 +78,8 @@ contains
       ! An imaginary part is a damping that excites.
       if (basis%n_internal == 0) then
          call form_uncondensed(self, basis, harmonic, theta, s, load)
-      else if (self%group%serves .and. all(abs(aimag(theta)) <= 0.0_wp)) then
+      else if (self%group%serves .and. all(abs(aimag(theta)) <= 0.0_wp) .and. &
+               basis%loss <= 0.0_wp) then
          call form_groups(self, basis, harmonic, real(theta, wp), s, load, n_failed)
       else if (basis%n_coordinates < coordinates_for_threads) then
          do h = 1, size(harmonic)
@@ -133,8 +134,8 @@ contains
       integer :: j
 
       do j = 1, basis%n_coordinates
-         call combine(basis%n_coordinates, basis%n_blocks, theta, s, basis%blocks(:, j, :), &
-                      matrix(:, j))
+         call combine(basis%n_coordinates, basis%n_blocks, theta, s, basis%loss_at(s), &
+                      basis%blocks(:, j, :), matrix(:, j))
       end do
       call find_load(basis%load_q, basis%waves, n, s, load)
    end subroutine add_matrices
@@ -233,17 +234,18 @@ contains
       in_order = all([(used(j) == j, j=1, n_used)])
       do j = 1, n_active
          if (in_order) then
-            call combine(n_used, basis%n_blocks, theta, s, basis%blocks(:n_used, j, :), &
-                         matrix(:, j))
+            call combine(n_used, basis%n_blocks, theta, s, basis%loss_at(s), &
+                         basis%blocks(:n_used, j, :), matrix(:, j))
          else
-            call combine(n_used, basis%n_blocks, theta, s, basis%blocks(used, used(j), :), &
-                         matrix(:, j))
+            call combine(n_used, basis%n_blocks, theta, s, basis%loss_at(s), &
+                         basis%blocks(used, used(j), :), matrix(:, j))
          end if
       end do
       if (n_i == 0) return
       allocate (z_iq(n_i, n_used), solved(n_i, n_right), part(n_used))
       do j = 1, n_used
-         call combine(n_i, basis%n_blocks, theta, s, basis%coupling(:, :, used(j)), z_iq(:, j))
+         call combine(n_i, basis%n_blocks, theta, s, basis%loss_at(s), &
+                      basis%coupling(:, :, used(j)), z_iq(:, j))
       end do
       ! The internal load is one more right-hand side of the same factors.
       solved(:, :n_active) = z_iq(:, :n_active)
@@ -256,11 +258,11 @@ contains
       load = load + part
    end subroutine form_block
 
-   !> K - theta M + i s C.
-   pure subroutine combine(n, n_blocks, theta, s, blocks, z)
+   !> (1 + i loss) K - theta M + i s C.
+   pure subroutine combine(n, n_blocks, theta, s, loss, blocks, z)
       integer, intent(in) :: n, n_blocks
       complex(wp), intent(in) :: theta
-      real(wp), intent(in) :: s
+      real(wp), intent(in) :: s, loss
       !> K, M and, with damping, C in columns (n, n_blocks).
       real(wp), intent(in) :: blocks(:, :)
       complex(wp), intent(out) :: z(n)
@@ -272,6 +274,7 @@ contains
       else
          z = cmplx(blocks(:, 1) - real(theta, wp)*blocks(:, 2), -aimag(theta)*blocks(:, 2), wp)
       end if
+      if (loss > 0.0_wp) z = z + cmplx(0.0_wp, loss*blocks(:, 1), wp)
    end subroutine combine
 
    !> z = z - z_iq^T solved, symmetric in its first rows: by blocks of columns down to the diagonal

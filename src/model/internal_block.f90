@@ -1,6 +1,6 @@
-!> The internal block of a condensation at one harmonic, D_j = k_j - theta m_j + i s c_j: a
-!> diagonal, or factors where the damping couples the internal modes. A sector fills its own
-!> (fw_sector_stiffness).
+!> The internal block of a condensation at one harmonic, D_j = k_j - theta m_j + i s c_j, with a
+!> loss factor k_j (1 + i eta) in place of k_j: a diagonal, or factors where the damping couples the
+!> internal modes. A sector fills its own (fw_sector_stiffness).
 module fw_internal_block
    use fw_kinds, only: wp
    use fw_linalg, only: complex_lu_type
@@ -36,6 +36,9 @@ contains
       failed = .false.
       self%coupled = allocated(basis%c_ii)
       self%inverse = cmplx(basis%k_i - real(theta, wp)*basis%m_i, -aimag(theta)*basis%m_i, wp)
+      if (basis%loss_at(s) > 0.0_wp) then
+         self%inverse = self%inverse + cmplx(0.0_wp, basis%loss*basis%k_i, wp)
+      end if
       if (self%coupled) then
          call self%lu%reserve(basis%n_internal)
          self%lu%matrix = cmplx(0.0_wp, s*basis%c_ii, wp)

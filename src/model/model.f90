@@ -18,6 +18,9 @@ module fw_model
       real(wp), allocatable :: stiffness(:, :), damping(:, :), load_static(:)
       !> The parameter in the case.
       real(wp) :: value = 0.0_wp
+      !> Whether the change of the stiffness is one of hysteretic damping, i times it above harmonic
+      !> 0.
+      logical :: is_loss = .false.
    end type matrix_change
 
    type :: model_type
@@ -34,6 +37,9 @@ module fw_model
       type(cyclic_type) :: cyclic
       !> Names of the units, 'length-mass-time-force', for labels; not allocated if not known.
       character(:), allocatable :: unit_system
+      !> Hysteretic damping, i times this part of the stiffness in harmonics above 0; of sectors it
+      !> is in `cyclic`.
+      real(wp) :: loss_factor = 0.0_wp
       !> Whether something of it depends on the rotation speed.
       logical :: rotates = .false.
       !> What parameters change, of those that were asked for; not allocated where none was.
@@ -46,6 +52,7 @@ module fw_model
       real(wp) :: harmonic_scale = 1.0_wp, static_scale = 1.0_wp
    contains
       procedure :: load_columns
+      procedure :: at_frequency
       procedure :: n_observed
    end type model_type
 
@@ -59,6 +66,43 @@ contains
       columns = self%waves%with_columns(self%load_static, self%load_cosine, self%load_sine, &
                                         self%load_wave)
    end function load_columns
+
+   !> The matrices at the speed that follows a frequency [rad/s].
+   pure function at_frequency(self, omega) result(model)
+      class(model_type), intent(in) :: self
+      real(wp), intent(in) :: omega
+      type(model_type) :: model
+      real(wp) :: rate
+
+      model = self
+      if (.not. allocated(self%cyclic%speed)) return
+      associate (speed => self%cyclic%speed)
+         rate = omega/speed%order
+         if (allocated(speed%stiffness)) model%stiffness = model%stiffness + rate**2*speed%stiffness
+         if (allocated(speed%damping)) model%damping = model%damping + rate**2*speed%damping
+         call add(speed%coriolis, rate, model%cyclic%coriolis)
+         call add(speed%structural, rate**2, model%cyclic%structural)
+         if (.not. allocated(speed%circulatory)) return
+         model%stiffness = model%stiffness + 0.5_wp*rate* &
+                           (speed%circulatory + transpose(speed%circulatory))
+         call add(0.5_wp*(speed%circulatory - transpose(speed%circulatory)), rate, &
+                  model%cyclic%circulatory)
+      end associate
+   end function at_frequency
+
+   !> total = total + factor matrix, of either of which none may be there.
+   pure subroutine add(matrix, factor, total)
+      real(wp), intent(in), optional :: matrix(:, :)
+      real(wp), intent(in) :: factor
+      real(wp), allocatable, intent(inout) :: total(:, :)
+
+      if (.not. present(matrix)) return
+      if (allocated(total)) then
+         total = total + factor*matrix
+      else
+         total = factor*matrix
+      end if
+   end subroutine add
 
    !> Observed quantities of all sectors that are solved for.
    pure integer function n_observed(self)

@@ -31,6 +31,10 @@ module fw_model_keys
       real(wp) :: modal_damping = 0.0_wp
       !> [rad/s]
       real(wp) :: rotation_speed = 0.0_wp
+      !> Hysteretic damping in parts of the stiffness.
+      real(wp) :: loss_factor = 0.0_wp
+      !> Frequency over the rotation speed, where this follows it (&sweep speed_order).
+      real(wp) :: speed_order = 0.0_wp
       !> Factors of the static and of the vibratory load.
       real(wp) :: static_scale = 1.0_wp
       real(wp) :: harmonic_scale = 1.0_wp
@@ -77,10 +81,14 @@ contains
    end subroutine bind_order
 
    !> The matrices (n_dof, n_dof), each left unallocated where it is not given.
-   subroutine bind_matrices(keys, is_inline, mass, stiffness, damping)
+   subroutine bind_matrices(keys, is_inline, mass, stiffness, damping, structural, circulatory, &
+                            stiffness_unsymmetric, damping_unsymmetric)
       class(key_visitor), intent(inout) :: keys
       logical, intent(in) :: is_inline
       real(wp), allocatable, intent(inout) :: mass(:, :), stiffness(:, :), damping(:, :)
+      real(wp), allocatable, intent(inout) :: structural(:, :), circulatory(:, :)
+      real(wp), allocatable, intent(inout) :: stiffness_unsymmetric(:, :), &
+         damping_unsymmetric(:, :)
       character(*), parameter :: shape = 'n_dof x n_dof'
 
       call keys%bind(key('mass', 'symmetric, no negative diagonal; may be singular', unit='M', &
@@ -90,6 +98,17 @@ contains
                          absent='required inline'), stiffness, is_inline)
       call keys%bind(key('damping', 'symmetric; the next three add to it', unit='F s/L', &
                          shape=shape, repeats=.false., absent='0'), damping)
+      call keys%bind(key('structural_damping', 'hysteretic, symmetric: i times it is added to '// &
+                         'the stiffness in harmonics above 0', unit='F/L', shape=shape, &
+                         repeats=.false., absent='0'), structural)
+      call keys%bind(key('circulatory', 'stiffness for each rad/s of rotation_speed, of any '// &
+                         'shape: (i, j) is the force on dof i by dof j, column after column', &
+                         unit='F s/L', shape=shape, repeats=.false., absent='0'), circulatory)
+      call keys%bind(key('stiffness_unsymmetric', 'added to the stiffness as it is, of '// &
+                         'bearings for one', unit='F/L', shape=shape, repeats=.false., &
+                         absent='0'), stiffness_unsymmetric)
+      call keys%bind(key('damping_unsymmetric', 'added to the damping as it is', unit='F s/L', &
+                         shape=shape, repeats=.false., absent='0'), damping_unsymmetric)
    end subroutine bind_matrices
 
    !> What is added to the matrices once they are there, inline or from a file.
@@ -104,8 +123,12 @@ contains
       call keys%bind(key('modal_damping', 'fraction of critical damping of every mode with '// &
                          'open contact', at_least(0.0_wp)), self%modal_damping)
       call keys%bind(key('rotation_speed', 'adds its square times stiffness_rotation and '// &
-                         'load/static_rotation of the model file', at_least(0.0_wp), &
+                         'load/static_rotation of the model file, and its multiple of '// &
+                         'coriolis and circulatory', at_least(0.0_wp), &
                          unit='rad/s'), self%rotation_speed)
+      call keys%bind(key('loss_factor', 'adds i times this part of the stiffness, with '// &
+                         'rotation, in harmonics above 0: hysteretic damping', &
+                         at_least(0.0_wp)), self%loss_factor)
    end subroutine bind_additions
 
    !> Group &load, begun here; what a model file holds stays where nothing is given.

@@ -33,7 +33,7 @@ module fw_modes
 contains
 
    !> The modes with frequencies within a range; none where the pencil has no solution.
-   subroutine find_modes(mass, damping, stiffness, load, observe, range, modes)
+   subroutine find_modes(mass, damping, stiffness, load, observe, range, modes, loss)
       !> (n, n), symmetric.
       real(wp), intent(in) :: mass(:, :), damping(:, :), stiffness(:, :)
       !> Cosine and sine load (n, 2).
@@ -43,8 +43,10 @@ contains
       !> Lowest and highest frequency [rad/s].
       real(wp), intent(in) :: range(2)
       type(mode_type), allocatable, intent(out) :: modes(:)
+      !> Hysteretic damping in parts of the stiffness (default: none).
+      real(wp), intent(in), optional :: loss
       real(wp), allocatable :: theta(:), shapes(:, :)
-      real(wp) :: shift, square
+      real(wp) :: shift, square, part
       logical :: done
       integer, allocatable :: in_range(:)
       integer :: i, j, trial
@@ -69,24 +71,26 @@ contains
          if (square < range(1)**2 .or. square > range(2)**2 .or. square <= 0.0_wp) cycle
          in_range = [in_range, j]
       end do
+      part = 0.0_wp
+      if (present(loss)) part = loss
       deallocate (modes)
       allocate (modes(size(in_range)))
       do i = 1, size(in_range)
          j = in_range(i)
          ! x^T (K + shift M) x = 1, hence x^T M x = theta; over its root the modal mass is one.
          modes(i) = new_mode(sqrt(1.0_wp/theta(j) - shift), shapes(:, j)/sqrt(theta(j)), damping, &
-                             load, observe)
+                             part, load, observe)
       end do
    end subroutine find_modes
 
    !> A mode of unit modal mass.
-   function new_mode(omega, shape_of, damping, load, observe) result(mode)
-      real(wp), intent(in) :: omega, shape_of(:), damping(:, :), load(:, :), observe(:, :)
+   function new_mode(omega, shape_of, damping, loss, load, observe) result(mode)
+      real(wp), intent(in) :: omega, shape_of(:), damping(:, :), loss, load(:, :), observe(:, :)
       type(mode_type) :: mode
       real(wp) :: drive
 
       mode%omega = omega
-      mode%width = dot_product(shape_of, matmul(damping, shape_of))
+      mode%width = dot_product(shape_of, matmul(damping, shape_of)) + loss*omega
       drive = norm2(matmul(shape_of, load))
       ! U| = |o x| |x^T f|/(omega c) at resonance, with o the observed row and c the width.
       mode%amplitude = abs(matmul(observe, shape_of))*drive/ &

@@ -11,14 +11,15 @@ module fw_parameters
              is_per_spring
    public :: harmonic_scale, static_scale, friction_coefficient, normal_load, gap, &
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
-             rotation_speed, rayleigh_mass, rayleigh_stiffness, normal_coefficient, reference_force
+             rotation_speed, rayleigh_mass, rayleigh_stiffness, normal_coefficient, &
+             reference_force, loss_factor
    public :: of_sliding, of_closing, of_pressed, not_negative, positive
 
    integer, parameter :: harmonic_scale = 1, static_scale = 2, friction_coefficient = 3, &
                          normal_load = 4, gap = 5, tangential_stiffness = 6, &
                          normal_stiffness = 7, spring_coefficient = 8, modal_damping = 9, &
                          rotation_speed = 10, rayleigh_mass = 11, rayleigh_stiffness = 12, &
-                         normal_coefficient = 13, reference_force = 14
+                         normal_coefficient = 13, reference_force = 14, loss_factor = 17
 
    !> Where its values are: one of the loads, one for each pair or spring, one of the matrices, one
    !> for each of a group of other elements (its coefficient).
@@ -60,7 +61,8 @@ module fw_parameters
       parameter_type('contact%normal_coefficient', of_pairs, positive, of_closing), &
       parameter_type('contact%reference_force', of_pairs, positive, of_closing), &
       parameter_type('polynomial%coefficient', of_elements), &
-      parameter_type('damper%coefficient', of_elements)]
+      parameter_type('damper%coefficient', of_elements), &
+      parameter_type('model%loss_factor', of_matrices, not_negative)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word

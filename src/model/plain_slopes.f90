@@ -68,6 +68,7 @@ contains
                                           load_slope(b%load_q, b%waves, harmonic, s, n)
          if (b%n_internal == 0) return
          coupling = cmplx(k_iq - s**2*m_iq, s*c_iq, wp)
+         if (b%loss_at(s) > 0.0_wp) coupling = coupling + cmplx(0.0_wp, b%loss*k_iq, wp)
          slope = n*cmplx(-2.0_wp*s*m_iq, c_iq, wp)
       end associate
       call internal%factor(b, cmplx(s**2, kind=wp), s, failed)

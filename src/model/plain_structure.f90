@@ -118,7 +118,7 @@ contains
       if (present(forms_blocks)) self%forms_blocks = forms_blocks
       if (self%forms_blocks) return
       ! Kept modes have no stiffness of their own to trust.
-      if (size(self%kept) == 0) call find_dynamic_part(self%basis, &
+      if (size(self%kept) == 0 .and. self%basis%loss <= 0.0_wp) call find_dynamic_part(self%basis, &
                                      maxval(harmonic)*omega_range(2), self%dynamic)
    end subroutine new_plain_structure
 
@@ -145,6 +145,7 @@ contains
       allocate (plain)
       plain%factors%harmonic = self%harmonic
       plain%factors%column = self%column
+      plain%factors%loss = self%basis%loss
       allocate (plain%factors%theta(nh), source=(0.0_wp, 0.0_wp))
       allocate (plain%factors%s(nh), source=0.0_wp)
       call plain%reserve_loads(m, nh)
@@ -254,6 +255,7 @@ contains
                inertia = s**2*b%blocks(j, j, 2)
                damping = 0.0_wp
                if (b%n_blocks == 3) damping = s*abs(b%blocks(j, j, 3))
+               damping = damping + b%loss*abs(stiffness)
             end associate
             if (abs(stiffness - inertia) + damping > round_off*(stiffness + inertia)) cycle
             if (abs(state%load(j, h)) > 0.0_wp) then

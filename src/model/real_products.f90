@@ -27,6 +27,8 @@ module fw_real_products
       !> Retained harmonics and their columns (n_retained).
       integer, allocatable :: harmonic(:), column(:)
       real(wp) :: k = 1.0_wp
+      !> In harmonics above 0 (1 + i loss) K in place of K.
+      real(wp) :: loss = 0.0_wp
       !> (n omega)**2 + i n omega xi of each harmonic (n_retained).
       complex(wp), allocatable :: theta(:)
       !> n omega.
@@ -260,12 +262,12 @@ contains
       real(wp), intent(in) :: v(n, *)
       integer, intent(in) :: first, n_inner
       real(wp), intent(inout) :: multiples(n_inner, n_blocks, *)
-      real(wp) :: re, im
+      real(wp) :: re, im, loss
       integer :: h, k
 
       ! Without rows no column has a first entry.
       if (n == 0) return
-      !$omp parallel do default(none) private(h, k, re, im) &
+      !$omp parallel do default(none) private(h, k, re, im, loss) &
       !$omp if(n*size(factors%harmonic) >= entries_for_threads) &
       !$omp shared(factors, n, n_blocks, sign, v, first, n_inner, multiples) schedule(static, 1)
       do h = 1, size(factors%harmonic)
@@ -273,27 +275,29 @@ contains
          re = real(factors%theta(h), wp)
          im = aimag(factors%theta(h))
          if (factors%harmonic(h) == 0) then
-            call fill_column(n, n_blocks, sign, v(1, k), v(1, k), factors%k, -re, 0.0_wp, 0.0_wp, &
-                             first, n_inner, multiples(1, 1, k))
+            call fill_column(n, n_blocks, sign, v(1, k), v(1, k), factors%k, 0.0_wp, -re, 0.0_wp, &
+                             0.0_wp, first, n_inner, multiples(1, 1, k))
          else
-            call fill_column(n, n_blocks, sign, v(1, k), v(1, k + 1), factors%k, -re, -im, &
+            loss = factors%k*factors%loss
+            call fill_column(n, n_blocks, sign, v(1, k), v(1, k + 1), factors%k, loss, -re, -im, &
                              factors%s(h), first, n_inner, multiples(1, 1, k))
-            call fill_column(n, n_blocks, sign, v(1, k + 1), v(1, k), factors%k, -re, im, &
+            call fill_column(n, n_blocks, sign, v(1, k + 1), v(1, k), factors%k, -loss, -re, im, &
                              -factors%s(h), first, n_inner, multiples(1, 1, k + 1))
          end if
       end do
       !$omp end parallel do
    end subroutine place_multiples
 
-   !> One column: k a, re a + im b and s b.
-   pure subroutine fill_column(n, n_blocks, sign, a, b, k, re, im, s, first, n_inner, column)
+   !> One column: k a + loss b, re a + im b and s b.
+   pure subroutine fill_column(n, n_blocks, sign, a, b, k, loss, re, im, s, first, n_inner, column)
       integer, intent(in) :: n, n_blocks
       real(wp), intent(in) :: sign
-      real(wp), intent(in) :: a(n), b(n), k, re, im, s
+      real(wp), intent(in) :: a(n), b(n), k, loss, re, im, s
       integer, intent(in) :: first, n_inner
       real(wp), intent(inout) :: column(n_inner, n_blocks)
 
       column(first + 1:first + n, 1) = sign*(k*a)
+      if (abs(loss) > 0.0_wp) column(first + 1:first + n, 1) = sign*(k*a + loss*b)
       if (n_blocks >= 2) column(first + 1:first + n, 2) = sign*(re*a + im*b)
       if (n_blocks == 3) column(first + 1:first + n, 3) = sign*(s*b)
    end subroutine fill_column

@@ -35,6 +35,8 @@ module fw_reduction
       real(wp), allocatable :: k_i(:), m_i(:), c_i(:)
       !> Internal damping, only where it is not diagonal (n_internal, n_internal).
       real(wp), allocatable :: c_ii(:, :)
+      !> i times this much of the stiffness is hysteretic damping in harmonics above 0.
+      real(wp) :: loss = 0.0_wp
       !> Loads in columns (n_coordinates, n_columns), (n_internal, n_columns), and what these are.
       real(wp), allocatable :: load_q(:, :), load_i(:, :)
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
@@ -46,6 +48,10 @@ module fw_reduction
       !> the internal modes (n, n, n_changes), and of the static load (n, n_changes); not allocated
       !> where none was asked for.
       real(wp), allocatable :: change_k(:, :, :), change_c(:, :, :), change_load(:, :)
+      !> Whether that of K is one of hysteretic damping (n_changes).
+      logical, allocatable :: change_loss(:)
+   contains
+      procedure :: loss_at
    end type reduction_type
 
    !> What asks for the eigenproblem, and neither depends on harmonics nor on frequencies: balances
@@ -101,6 +107,7 @@ contains
          if (allocated(error)) return
          if (present(held)) held = basis
       end if
+      self%loss = model%loss_factor
       call move_alloc(basis%t_q, t_q)
       call move_alloc(basis%t_i, t_i)
       call move_alloc(basis%k_i, self%k_i)
@@ -211,6 +218,7 @@ contains
       t(:, m + 1:) = t_i
       allocate (self%change_k(n, n, size(model%changes)), self%change_load(n, size(model%changes)))
       allocate (self%change_c, mold=self%change_k)
+      self%change_loss = model%changes%is_loss
       do k = 1, size(model%changes)
          self%change_k(:, :, k) = congruence(t, model%changes(k)%stiffness, t)
          self%change_c(:, :, k) = congruence(t, model%changes(k)%damping, t)
@@ -391,9 +399,19 @@ contains
 
       associate (k => self%k_i(mode), m => self%m_i(mode), c => self%c_i(mode))
          is_undamped = k > 0.0_wp .and. m > 0.0_wp
-         if (is_undamped) is_undamped = .not. c > 2.0_wp*undamped_ratio*sqrt(k*m)
+         if (is_undamped) is_undamped = .not. (c > 2.0_wp*undamped_ratio*sqrt(k*m) .or. &
+                                               self%loss > 2.0_wp*undamped_ratio)
       end associate
    end function is_undamped
+
+   !> Part of the stiffness that damps a harmonic: none in harmonic 0.
+   elemental real(wp) function loss_at(self, s) result(loss)
+      class(reduction_type), intent(in) :: self
+      !> n omega.
+      real(wp), intent(in) :: s
+
+      loss = merge(self%loss, 0.0_wp, s > 0.0_wp)
+   end function loss_at
 
    !> Of an internal mode [rad/s]; 0 where it does not vibrate.
    pure real(wp) function frequency(self, mode)

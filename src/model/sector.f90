@@ -31,6 +31,9 @@ contains
       if (model%cyclic%has_nodal()) then
          nodal = model%cyclic%nodal(k + 1)
          if (allocated(model%cyclic%air)) call add_air(model, k, nodal)
+         if (model%cyclic%loss_factor > 0.0_wp) then
+            call nodal%add_structural(model%cyclic%loss_factor*nodal%stiffness)
+         end if
          return
       end if
       call tie_sector(model, k, place, turn, n)
@@ -41,6 +44,12 @@ contains
       if (allocated(model%cyclic%coriolis)) nodal%coriolis = tied(model%cyclic%coriolis, place, &
                                                                   turn, n)
       if (allocated(model%cyclic%air)) call add_air(model, k, nodal)
+      if (allocated(model%cyclic%circulatory)) then
+         call nodal%add_circulatory(tied(model%cyclic%circulatory, place, turn, n))
+      end if
+      if (allocated(model%cyclic%structural)) then
+         call nodal%add_structural(tied(model%cyclic%structural, place, turn, n))
+      end if
       if (model%cyclic%modal_damping > 0.0_wp) then
          call damp_modes(model%cyclic%modal_damping, nodal, error)
       end if

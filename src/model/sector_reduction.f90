@@ -6,7 +6,7 @@
 !> (a row that depends on others there, a mode kept of another nodal diameter) is padded: a spring
 !> of its own that nothing loads.
 module fw_sector_reduction
-   use fw_cyclic_data, only: nodal_matrices
+   use fw_cyclic_data, only: nodal_matrices, speed_matrices
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hermitian, only: cholesky, congruence, product_of, is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
@@ -39,6 +39,12 @@ module fw_sector_reduction
       !> Coriolis, which i s goes with (m + n_internal, m + n_internal), and the air, for the wave
       !> of this nodal diameter and for the one the other way (.., 2), in the coordinates of each.
       complex(wp), allocatable :: coriolis(:, :), aero(:, :, :)
+      !> The skew part of the stiffness for harmonic 0, with which nothing is condensed (m, m), and
+      !> the matrix of hysteretic damping (m + n_internal, m + n_internal), see nodal_matrices.
+      complex(wp), allocatable :: circulatory(:, :), structural(:, :)
+      !> What a rotation speed that follows the frequency adds, in the coordinates: nothing is
+      !> condensed then.
+      type(speed_matrices), allocatable :: speed
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       complex(wp), allocatable :: observe_q(:, :), observe_i(:, :)
       !> Coordinates that this nodal diameter does not have (n_coordinates).
@@ -50,6 +56,9 @@ module fw_sector_reduction
    contains
       procedure :: find_modes
       procedure :: keep_resonances
+      procedure :: keep_all
+      procedure :: keep_dofs
+      procedure :: take_speed
       procedure :: keep_of_mode
       procedure :: transform
       procedure :: pushes_free_mode
@@ -151,23 +160,29 @@ contains
 
    !> Internal modes without damping that a harmonic may hit become coordinates, scaled to a largest
    !> displacement of 1, see fw_reduction.
-   subroutine keep_resonances(self, harmonic, omega_range, whirls)
+   subroutine keep_resonances(self, harmonic, omega_range, whirls, nodal)
       class(sector_reduction), intent(inout) :: self
       !> The harmonics of this nodal diameter.
       integer, intent(in) :: harmonic(:)
       real(wp), intent(in) :: omega_range(2)
       !> Whether blocks couple the internal modes that are not Hermitian.
       logical, intent(in) :: whirls
+      type(nodal_matrices), intent(in) :: nodal
       real(wp), parameter :: margin = 1.0e-2_wp
       logical :: keep(self%n_internal)
       real(wp) :: frequency
+      complex(wp), allocatable :: structural(:, :)
       integer :: j
 
+      if (allocated(nodal%structural)) structural = congruence(self%t_i, nodal%structural, self%t_i)
       keep = .false.
       do j = 1, self%n_internal
          if (self%k_i(j) <= 0.0_wp .or. self%m_i(j) <= 0.0_wp) cycle
          frequency = sqrt(self%k_i(j)/self%m_i(j))
          if (self%c_i(j) > 2.0_wp*undamped_ratio*sqrt(self%k_i(j)*self%m_i(j))) cycle
+         if (allocated(structural)) then
+            if (real(structural(j, j), wp) > 2.0_wp*undamped_ratio*self%k_i(j)) cycle
+         end if
          ! Nobody knows where Coriolis forces move them, or what the air leaves of damping.
          keep(j) = whirls .or. any(frequency >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
                                    frequency <= (1.0_wp + margin)*harmonic*omega_range(2))
@@ -189,6 +204,59 @@ contains
          call move_to_coordinates(self, is_first .or. (vibrates .and. is_met))
       end associate
    end subroutine keep_of_mode
+
+   !> Condense nothing: forces across the motion may take from any mode what damping it has, and
+   !> hold a free one.
+   subroutine keep_all(self)
+      class(sector_reduction), intent(inout) :: self
+
+      call move_to_coordinates(self, spread(.true., 1, self%n_internal))
+   end subroutine keep_all
+
+   !> Condense nothing, in a basis that no speed changes: every free dof is a coordinate.
+   subroutine keep_dofs(self, nodal_diameter, n, relative)
+      class(sector_reduction), intent(out) :: self
+      integer, intent(in) :: nodal_diameter
+      !> Coordinates of the nodal diameter.
+      integer, intent(in) :: n
+      type(sector_relative), intent(in) :: relative
+
+      self%nodal_diameter = nodal_diameter
+      call split_basis(relative, n, self%t_q, self%t_i)
+      self%n_internal = size(self%t_i, 2)
+      allocate (self%k_i(self%n_internal), self%m_i(self%n_internal), self%c_i(self%n_internal), &
+                source=0.0_wp)
+      allocate (self%kept(0))
+      call move_to_coordinates(self, spread(.true., 1, self%n_internal))
+   end subroutine keep_dofs
+
+   !> Take what follows the frequency to the coordinates; before `transform`, which forgets the
+   !> basis. Of one sector, whose basis is real.
+   subroutine take_speed(self, speed)
+      class(sector_reduction), intent(inout) :: self
+      type(speed_matrices), intent(in) :: speed
+      real(wp), allocatable :: t(:, :)
+
+      t = real(self%t_q, wp)
+      allocate (self%speed)
+      self%speed%order = speed%order
+      call take(speed%coriolis, self%speed%coriolis)
+      call take(speed%circulatory, self%speed%circulatory)
+      call take(speed%stiffness, self%speed%stiffness)
+      call take(speed%damping, self%speed%damping)
+      call take(speed%structural, self%speed%structural)
+      if (allocated(speed%load)) self%speed%load = matmul(speed%load, t)
+
+   contains
+
+      subroutine take(matrix, reduced)
+         real(wp), allocatable, intent(in) :: matrix(:, :)
+         real(wp), allocatable, intent(inout) :: reduced(:, :)
+
+         if (allocated(matrix)) reduced = matmul(transpose(t), matmul(matrix, t))
+      end subroutine take
+
+   end subroutine take_speed
 
    !> Make coordinates of internal modes.
    subroutine move_to_coordinates(self, keep)
@@ -273,6 +341,9 @@ contains
       t(:, :m) = self%t_q
       t(:, m + 1:) = self%t_i
       if (allocated(nodal%coriolis)) self%coriolis = congruence(t, nodal%coriolis, t)
+      if (allocated(nodal%circulatory)) self%circulatory = congruence(self%t_q, nodal%circulatory, &
+                                                                      self%t_q)
+      if (allocated(nodal%structural)) self%structural = congruence(t, nodal%structural, t)
       if (.not. allocated(nodal%aero)) return
       allocate (self%aero(size(t, 2), size(t, 2), 2))
       self%aero(:, :, 1) = congruence(t, nodal%aero(:, :, 1), t)

@@ -79,6 +79,7 @@ module fw_structure_operator
       procedure(derive_observed), deferred :: observed_slope
       procedure(find_load_work), deferred :: load_work
       procedure :: undetermined => none_undetermined
+      procedure :: structural_work
       procedure :: whole_size
       procedure :: condense_field
       procedure :: complete_field
@@ -308,6 +309,18 @@ contains
       associate (unused => self, unused_state => state)
       end associate
    end subroutine none_undetermined
+
+   !> Work of hysteretic damping in one cycle [energy], of complex amplitudes of the coordinates
+   !> (n_coordinates, n_retained).
+   real(wp) function structural_work(self, state, q) result(work)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+
+      work = 0.0_wp
+      associate (unused => self, unused_state => state, unused_q => q)
+      end associate
+   end function structural_work
 
    ! The whole field: the coordinates and what is condensed behind them, complex amplitudes
    ! (whole_size, n_retained). Structures without it leave these as they are.

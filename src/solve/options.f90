@@ -91,6 +91,8 @@ module fw_solver_options
       integer :: max_points = 1000
       !> Compute the Floquet multipliers of every point.
       logical :: stability = .false.
+      !> Frequency over the rotation speed, where this follows it (0: it does not).
+      real(wp) :: speed_order = 0.0_wp
       !> Points that are solved to find maxima become rows of the result.
       logical :: refine = .false.
       !> A piece of the sweep, which sessions ask for (no keys): its rows (0: up to the last), and
@@ -192,6 +194,9 @@ contains
                          only="continuation = 'arclength'"), self%max_points)
       call keys%bind(key('stability', 'compute the Floquet multipliers of every point', &
                          only="springs, law = 'penalty', 'regularised'"), self%stability)
+      call keys%bind(key('speed_order', 'the rotation speed is the frequency over this: 1 for '// &
+                         'unbalance, an engine order of the loads; 0: it does not follow', &
+                         at_least(0.0_wp), only="analysis = 'frf', 'point'"), self%speed_order)
       call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
                          only="analysis = 'frf', continuation = 'natural'"), self%refine)
    end subroutine bind_sweep_keys

@@ -42,7 +42,7 @@ def test_a_misspelled_part_is_refused_with_the_name_that_was_meant(case, old, ne
 
 
 @pytest.mark.parametrize(("name", "expected"), [
-    ("structural_damping", "damping is viscous here"), ("gyroscopic", "give the matrix"),
+    ("hysteretic_damping", "give the matrix as /structural_damping"), ("gyroscopic", "give the matrix"),
     ("polynomial", "is a dataset, expected a group"), ("springs", "did you mean /spring?"),
     ("unit_system", "did you mean attribute unit_system of /?"),
     ("contact/stick", "expected there: side_1, side_2, sector_2, mu, gap, area, normal_load, "

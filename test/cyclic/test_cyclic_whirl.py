@@ -171,6 +171,44 @@ def test_linear_response_of_the_annulus(tmp_path, seed, air):
             assert np.abs(amplitude(row, n) - whole.maps[0] @ u).max() < LINEAR * np.abs(u).max()
 
 
+@pytest.mark.parametrize("mistuned", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_linear_response_with_matrices_of_any_shape(tmp_path, seed, mistuned):
+    """Hysteretic damping and unsymmetric matrices of a sector, as a wave and of all sectors."""
+    case = whirling(seed, air="sector", n_sectors=5, n_pairs=1) | {"contact": {}}
+    rng, n = np.random.default_rng([72, seed]), len(case["model"]["mass"])
+    whole = Whole(case | {"contact": {"side_1": [], "side_2": [], "sector_2": []}})
+    root = rng.normal(size=(n, n))
+    parts = {"structural_damping": 0.01 * root @ root.T,
+             "stiffness_unsymmetric": 0.05 * rng.normal(size=(n, n)),
+             "damping_unsymmetric": 0.01 * rng.normal(size=(n, n)),
+             "circulatory": 0.05 * rng.normal(size=(n, n))}
+    write_sector(tmp_path / "model.h5", case)
+    with h5py.File(tmp_path / "model.h5", "r+") as file:
+        for name, matrix in parts.items():
+            file[name] = matrix
+    changes = {"model": {"loss_factor": 0.03}}
+    if mistuned:
+        changes["cyclic"] = {"mistuned": True}
+    run(tmp_path, groups_of(case, **changes))
+    found = read(tmp_path / "case.h5")
+    skew = whole.sum(parts["stiffness_unsymmetric"] + case["speed"] * parts["circulatory"])
+    d = whole.sum(parts["structural_damping"] + 0.03 * np.array(case["model"]["stiffness"]))
+    for i, (omega, row) in enumerate(zip(OMEGAS, found["coefficients"])):
+        work = 0.0
+        for h in (0, 1):
+            z = whole.stiffness(h, omega) + skew
+            if h > 0:
+                z = z + 1j * d + 1j * omega * whole.sum(parts["damping_unsymmetric"])
+            u = np.linalg.solve(z, whole.load(h))
+            wanted = whole.maps[0] @ u
+            here = amplitude(row, h)[:len(wanted)]
+            assert np.abs(here - wanted).max() < LINEAR * np.abs(u).max()
+            work += h * np.pi * (u.conj() @ d @ u).real / whole.n
+        if not mistuned:
+            assert found["structural/dissipation"][i] == pytest.approx(work, rel=1e-9)
+
+
 @pytest.mark.parametrize("air", [None, "sector", "nodal_diameter"])
 @pytest.mark.parametrize("law", ["penalty", "dlft"])
 @pytest.mark.parametrize("seed", range(3))

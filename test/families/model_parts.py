@@ -32,7 +32,8 @@ ZERO = ("unnamed", "silent", "blamed", "failed")
 
 N, PAIRS, SECTORS = 6, 2, 5
 PLAIN = {
-    "": ["mass", "stiffness", "damping", "stiffness_rotation", "coriolis"],
+    "": ["mass", "stiffness", "damping", "stiffness_rotation", "coriolis", "structural_damping",
+         "circulatory", "stiffness_unsymmetric", "damping_unsymmetric"],
     "contact": ["side_1", "side_2", "sector_2", "mu", "gap", "area", "normal_load",
                 "tangential_stiffness", "normal_stiffness", "slip_speed", "position", "patch"],
     "spring": ["side_1", "side_2", "sector_2", "coefficient", "power"],
@@ -90,6 +91,8 @@ def datasets(kind, draw):
         return parts
     parts |= {"mass": eye, "stiffness": ring, "damping": 0.1 * eye,
               "stiffness_rotation": 0.1 * eye, "coriolis": np.zeros((N, N)),
+              "structural_damping": 0.01 * eye, "circulatory": 0.01 * eye,
+              "stiffness_unsymmetric": 0.1 * eye, "damping_unsymmetric": 0.01 * eye,
               "observe/matrix": np.eye(1, N), "cyclic/left": [1], "cyclic/right": [-4],
               "aero/modes": np.eye(2, N)}
     parts |= {f"load/{name}": 0.1 * np.ones(N) for name in NODAL["load"]}

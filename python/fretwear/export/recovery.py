@@ -83,6 +83,10 @@ def read_structure(result: Result) -> Structure:
         if session.part("n_springs")[0] > 0:
             raise AbsentError(f"{result.name}: the case has nonlinear springs, whose forces are "
                               "not in the result; observe every degree of freedom instead")
+        if session.part("speed_order")[0] > 0.0:
+            raise AbsentError(f"{result.name}: the rotation speed follows the frequency "
+                              "(sweep%speed_order), and with it the matrices; observe every "
+                              "degree of freedom instead")
         static = session.part("load/static")
         n = len(static)
         mass, stiffness, damping = (session.part(name).reshape(n, n)
@@ -94,7 +98,7 @@ def read_structure(result: Result) -> Structure:
             mass, stiffness, damping, static, session.part("load/cosine"),
             session.part("load/sine"), first - second, session.part("contact/gap"),
             session.part("observe/matrix").reshape(-1, n), (first, second),
-            wave, None if wave is None else read_whirl(session, n), _waves(session, n))
+            wave, read_whirl(session, n), _waves(session, n))
 
 
 def _waves(session: Session, n: int) -> tuple[tuple[int, int, Floats, Floats], ...]:
@@ -193,6 +197,9 @@ def relative_displacement(result: Result, points: Sequence[int] | None = None) -
 def _of_harmonic(s: Structure, harmonic: int) -> tuple[Structure, Complexes, Complexes]:
     """What a harmonic moves: the structure of its free dofs (of the static part), the tie to all
     dofs, and the rows of the relative displacements on the free ones."""
+    skew = None if s.whirl is None else s.whirl.circulatory
+    if harmonic == 0 and skew is not None:
+        s = replace(s, stiffness=s.stiffness + skew)
     if s.wave is None:
         return s, np.eye(len(s.stiffness), dtype=complex), s.contact.astype(complex)
     tie = s.wave.tie(harmonic, len(s.stiffness))

@@ -101,12 +101,16 @@ class Whirl:
         Its complex stiffness in each harmonic from 1.
     modal_damping : float
         Fraction of critical damping of every mode of every nodal diameter.
+    circulatory, structural : (n, n) or None
+        Skew part of the stiffness, and hysteretic damping.
     """
 
     coriolis: Floats | None
     modes: Floats
     air: Complexes
     modal_damping: float
+    circulatory: Floats | None = None
+    structural: Floats | None = None
 
     def added(self, harmonic: int, omega: float, tie: Complexes, mass: Floats,
               stiffness: Floats) -> Complexes:
@@ -116,6 +120,10 @@ class Whirl:
         found = np.zeros((n, n), dtype=complex)
         if self.coriolis is not None:
             found += 1j * w * (tie.conj().T @ self.coriolis @ tie)
+        if self.circulatory is not None:
+            found += tie.conj().T @ self.circulatory @ tie
+        if self.structural is not None:
+            found += 1j * (tie.conj().T @ self.structural @ tie)
         if len(self.air):
             rows = self.modes @ tie
             found += rows.conj().T @ self.air[harmonic - 1] @ rows
@@ -133,7 +141,9 @@ def read_whirl(session: Session, n: int) -> Whirl:
     coriolis, modes = session.part("coriolis"), session.part("aero/modes").reshape(-1, n)
     air = session.part("aero/stiffness").reshape(-1, max(1, len(modes)), max(1, len(modes)), 2)
     return Whirl(coriolis.reshape(n, n) if len(coriolis) else None, modes,
-                 air[..., 0] + 1j * air[..., 1], float(session.part("modal_damping")[0]))
+                 air[..., 0] + 1j * air[..., 1], float(session.part("modal_damping")[0]),
+                 *(matrix.reshape(n, n) if len(matrix := session.part(name)) else None
+                   for name in ("circulatory", "structural_damping")))
 
 
 def read_wave(result: Result, n_pairs: int) -> Wave | None:

@@ -13,7 +13,7 @@ from typing import Any, Union
 
 import numpy as np
 
-from .._namelist import literal
+from .._namelist import by_columns, literal
 from .._words import did_you_mean
 from ..errors import InputError, OutputError
 from .quantities import check_quantity
@@ -140,7 +140,7 @@ def read_plan(path: str | Path) -> Plan:
 
 def override(key: str, value: Setting) -> str:
     """Option --set of `fw_run`: KEY=VALUE in namelist syntax, reals to the last bit."""
-    return f"{key}={literal(value, key)}"
+    return f"{key}={literal(by_columns(key, value), key)}"
 
 
 class _Reader:
