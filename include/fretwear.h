@@ -167,6 +167,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    "structural/dissipation", energy per cycle, and "speed", where the case has them
    (2H+1, n_observed):    "coefficients", in the order (0, c1, s1, c2, s2, ...)
    (n_observed):          "amplitude", largest magnitude over the period
+   with group &stress "stress/worst" (1), "stress/amplitude", "stress/mean" and
+   "stress/utilisation" (n_stress, of every sector), "stress/coefficients" (2H+1, n_stress, 6)
    (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)
    (n_pairs, 3):          "contact/fraction" of the period in stick, slip and open
    (n_pairs):             "contact/dissipation", energy per cycle
