@@ -12,7 +12,7 @@ module fw_walked_points
    use fw_response, only: response
    use fw_run_state, only: run_state
    use fw_solution_history, only: position
-   use fw_strategy, only: point_request, point_strategy
+   use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
    use fw_vibration, only: walk_type
    implicit none (type, external)
@@ -34,6 +34,9 @@ module fw_walked_points
       procedure :: solve
       procedure :: describe
       procedure :: describe_point
+      procedure :: remember
+      procedure :: recall
+      procedure :: start_anew
    end type walked_points
 
 contains
@@ -131,5 +134,32 @@ contains
             "ripple, not slip: take contact%law = 'rigid' where friction acts on mass"
       end associate
    end subroutine describe
+
+   !> The last solution, so that points of a search start from it; none where levels are asked for,
+   !> which a place alone does not tell.
+   subroutine remember(self, memory)
+      class(walked_points), intent(in) :: self
+      type(solver_memory), intent(out) :: memory
+
+      if (self%walk%known%kept == 0 .or. self%walk%limits%from_nothing) return
+      memory%x = self%walk%known%x(:, 1)
+      memory%omega = self%walk%known%place(1)
+   end subroutine remember
+
+   subroutine recall(self, memory)
+      class(walked_points), intent(inout) :: self
+      type(solver_memory), intent(in) :: memory
+
+      if (.not. allocated(memory%x)) return
+      call self%walk%known%begin_with(memory%omega, memory%x)
+   end subroutine recall
+
+   subroutine start_anew(self)
+      class(walked_points), intent(inout) :: self
+
+      if (self%walk%limits%from_nothing) return
+      self%walk%known%kept = 0
+      self%walk%failures = 0
+   end subroutine start_anew
 
 end module fw_walked_points

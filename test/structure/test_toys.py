@@ -188,71 +188,62 @@ def add_parameter(toy):
 
 
 def add_vibration(toy):
-    """&control of = 'toy': the load is not what gives an amplitude, but that many times its own."""
+    """&control share = 0.7: the response to a part of the load."""
     toy.new("src/driver/toy_vibration.f90", """\
-!> A response to a multiple of the load.
+!> The response to a share of the load.
 module fw_toy_vibration
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_newton, only: solver_report
-   use fw_point, only: point_type
    use fw_response, only: response
-   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution_history, only: position
-   use fw_strategy, only: point_request
    implicit none (type, external)
    private
 
    public :: toy_vibration
 
    type, extends(response) :: toy_vibration
-      real(wp) :: load = 1.0_wp
+      real(wp) :: share = 1.0_wp
    contains
+      procedure :: build
       procedure :: stand
-      procedure :: add_to
    end type toy_vibration
 
 contains
+
+   subroutine build(self, case, error)
+      class(toy_vibration), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      self%share = case%control%share
+      call self%response%build(case, error)
+   end subroutine build
 
    subroutine stand(self, at, error)
       class(toy_vibration), intent(inout) :: self
       type(position), intent(in) :: at
       type(error_type), allocatable, intent(out) :: error
 
-      self%load = at%level
-      call self%response%stand(at, error)
+      call self%response%stand(position(at%along, self%share*at%level), error)
    end subroutine stand
-
-   subroutine add_to(self, case, request, x, report, sensitivity, point, error)
-      class(toy_vibration), intent(inout) :: self
-      type(case_type), intent(in) :: case
-      type(point_request), intent(in) :: request
-      real(wp), intent(in), contiguous :: x(:)
-      type(solver_report), intent(in) :: report
-      type(sensitivity_solver), intent(inout) :: sensitivity
-      type(point_type), intent(inout) :: point
-      type(error_type), allocatable, intent(out) :: error
-
-      point%load_scale = self%load
-      point%control = request%amplitude
-      call self%response%add_to(case, request, x, report, sensitivity, point, error)
-   end subroutine add_to
 
 end module fw_toy_vibration
 """)
     toy.change("src/balance/control_options.f90",
-               ("   public :: control_options, of_first_harmonic, of_largest\n",
-                "   public :: control_options, of_first_harmonic, of_largest, of_toy\n"),
-               ("'first_harmonic', 'largest']", "'first_harmonic', 'largest', 'toy']"),
-               ("of_largest = 2\n", "of_largest = 2, of_toy = 3\n"))
+               ("      integer :: of = of_first_harmonic\n",
+                "      integer :: of = of_first_harmonic\n      real(wp) :: share = 0.0_wp\n"),
+               ("      call keys%bind_word(key('of',",
+                "      call keys%bind(key('share', 'of the load', above(0.0_wp)), self%share)\n"
+                "      call keys%bind_word(key('of',"))
     toy.change("src/driver/frequency_response.f90",
-               ("   use fw_error,", "   use fw_control_options, only: of_toy\n   use fw_error,"),
                ("   use fw_vibration_branch,",
                 "   use fw_toy_vibration, only: toy_vibration\n   use fw_vibration_branch,"),
-               ("         allocate (given_amplitude :: walked%v)\n",
-                "         if (case%control%of == of_toy) allocate (toy_vibration :: walked%v)\n"
-                "         if (.not. allocated(walked%v)) allocate (given_amplitude :: walked%v)\n"))
+               ("      else if (case%control%is_wanted()) then\n         allocate (walked)\n",
+                "      else if (case%control%share > 0.0_wp) then\n         allocate (walked)\n"
+                "         allocate (toy_vibration :: walked%v)\n"
+                "         call move_alloc(walked, strategy)\n"
+                "      else if (case%control%is_wanted()) then\n         allocate (walked)\n"))
 
 
 TOYS = {"law": add_law, "quantity": add_quantity, "rule": add_rule, "analysis": add_analysis,
@@ -399,34 +390,31 @@ def test_parameter_has_no_slope(built, tmp_path):
     assert "contact%slip_speed': its derivative is not known" in done.stderr
 
 
-def vibrate(program, folder, name, load, more, sweep=""):
-    """Result of a sweep with a load: coefficients, frequencies, scale of the load if it has one."""
+def vibrate(program, folder, name, load, more, sweep="n_points = 5"):
+    """Frequencies and coefficients of a sweep with a load."""
     text = RUBBING.format(law="regularised", more=more).replace("cosine = 1.0", f"cosine = {load}")
-    text = text.replace("n_points = 5", f"n_points = 5{sweep}")
-    done = run(program, folder, name, text)
+    done = run(program, folder, name, text.replace("n_points = 5", sweep))
     assert done.returncode == 0, done.stderr
     with h5py.File(folder / f"{name}.h5") as file:
-        return {key: file[key][:] for key in ("coefficients", "omega", "load/scale")
-                if key in file}
+        return file["omega"][:], file["coefficients"][:]
 
 
 def test_vibration_is_swept(built, tmp_path):
     """Points, walked to from each other, and a branch by arc length: from the base types alone."""
-    toy = vibrate(built[0], tmp_path, "toy", 1.0, "&control amplitude = 0.7, of = 'toy' /")
-    plain = vibrate(built[0], tmp_path, "plain", 0.7, "")
-    assert np.allclose(toy["load/scale"], 0.7, rtol=1e-15)
+    share = "&control share = 0.7 /"
     # Solved to 1e-8 or better, from the same guesses.
-    assert np.allclose(toy["coefficients"], plain["coefficients"], rtol=0, atol=1e-7)
-    branch = vibrate(built[0], tmp_path, "branch", 1.0,
-                     "&control amplitude = 0.7, of = 'toy' /", ", continuation = 'arclength'")
-    assert len(branch["omega"]) > 5 and branch["omega"][0] == 0.8
-    places = ", ".join(map(repr, branch["omega"].tolist()))
-    text = RUBBING.format(law="regularised", more="").replace("cosine = 1.0", "cosine = 0.7")
-    done = run(built[0], tmp_path, "there",
-               re.sub(r"&sweep.*?/\n", f"&sweep values = {places} /\n", text))
+    same = {"rtol": 0, "atol": 1e-7}
+    omega, toy = vibrate(built[0], tmp_path, "toy", 1.0, share)
+    assert np.allclose(toy, vibrate(built[0], tmp_path, "plain", 0.7, "")[1], **same)
+    omega, branch = vibrate(built[0], tmp_path, "branch", 1.0, share,
+                            "n_points = 5, continuation = 'arclength'")
+    assert len(omega) > 5 and omega[0] == 0.8 and abs(omega[-1] - 1.2) < 1e-12
+    places = f"values = {', '.join(map(repr, omega.tolist()))} /"
+    text = re.sub(r"start = .*?/\n", places + "\n", RUBBING.format(law="regularised", more=""))
+    done = run(built[0], tmp_path, "there", text.replace("cosine = 1.0", "cosine = 0.7"))
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "there.h5") as file:
-        assert np.allclose(branch["coefficients"], file["coefficients"][:], rtol=0, atol=1e-7)
+        assert np.allclose(branch, file["coefficients"][:], **same)
 
 
 def test_calls_before_newton(built, tmp_path):
