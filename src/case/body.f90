@@ -1,5 +1,5 @@
-!> What vibrates: the structure of a case, its contact pairs, springs and other elements, and what a parameter of it
-!> that moves needs. All that says how it is solved is in fw_case.
+!> What vibrates: the structure of a case, its contact pairs, springs and other elements, and what a
+!> parameter of it that moves needs. All that says how it is solved is in fw_case.
 module fw_body
    use fw_contact_data, only: contact_type, spring_type
    use fw_elements, only: element_list

@@ -156,7 +156,8 @@ contains
          laws = forces
       else
          call new_forces(case%contact, case%springs, case%elements, joint%row, joint%spring_row, &
-                         joint%element_row, locates_events(case, harmonics, joint), harmonics%filter_harmonics, laws)
+                         joint%element_row, locates_events(case, harmonics, joint), &
+                         harmonics%filter_harmonics, laws)
       end if
       call choose_harmonics(case, harmonics, joint, laws, fourier, error)
       if (allocated(error)) return

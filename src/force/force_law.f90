@@ -576,8 +576,8 @@ contains
       end do
    end subroutine slopes_about
 
-   !> Derivative of the forces by the frequency where the inputs are held, at the last evaluation, in
-   !> `work%output`: of most laws there is none, and the
+   !> Derivative of the forces by the frequency where the inputs are held, at the last evaluation,
+   !> in `work%output`: of most laws there is none, and the
    !> prediction says so.
    subroutine by_frequency(self, fourier, work)
       class(force_law), intent(in) :: self

@@ -82,8 +82,8 @@ contains
       logical :: needed
 
       needed = self%n_given > 0 .and. .not. allocated(self%factors)
-      call keys%bind_word(key('of', 'what the terms are: a potential, whose gradient the forces '// &
-                              'are, or a force on one dof each', absent=of_file), &
+      call keys%bind_word(key('of', 'what the terms are: a potential, whose gradient the '// &
+                              'forces are, or a force on one dof each', absent=of_file), &
                           self%of, of_words)
       call keys%bind(key('factors', 'signed dofs that a term is the product of, repeated for '// &
                          'powers; 0: none', dof_numbers(), shape='8 x n_terms', repeats=.false., &
@@ -125,8 +125,8 @@ contains
             text = 'of term '//to_text(i)//' are all 0: must name a dof at least'
          else if (self%of == of_energy .and. count(self%factors(:, i) /= 0) == 1) then
             key = 'factors'
-            text = 'of term '//to_text(i)//' are one dof: a potential of degree 1 is a constant '// &
-                   'force; give it as load%static'
+            text = 'of term '//to_text(i)//' are one dof: a potential of degree 1 is a '// &
+                   'constant force; give it as load%static'
          else if (self%of == of_force) then
             if (self%dof(i) /= 0) cycle
             key = 'dof'
