@@ -159,7 +159,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    copies them to a buffer with room for n, and leaves one that is too small as it is.
    1: "omega", "converged", "iterations", "residual", "seconds", "served_by", "fold"; with
    accuracy or adaptive "harmonics", "instants", "error_estimate"; with a sweep over another
-   parameter "parameter", of a load "load/scale", which &control has with "control/amplitude"
+   parameter "parameter", of a base that moves "base/coefficients", of a load "load/scale", which
+   &control has with "control/amplitude"
    (2H+1, n_observed):    "coefficients", in the order (0, c1, s1, c2, s2, ...)
    (n_observed):          "amplitude", largest magnitude over the period
    (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)

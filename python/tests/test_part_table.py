@@ -35,7 +35,8 @@ def whole(**more: Any) -> fw.Model:
     return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, springs=[fw.Spring(1, 2, 0.5)],
                     static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
                     stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
-                    observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
+                    observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N",
+                    load_table=[[1.0, 0.5], [2.0, 1.5]], **more)
 
 
 def nodal() -> fw.Model:
@@ -51,6 +52,8 @@ MODELS = {
     "laws": lambda: whole(contact=replace(PAIRS, law=["penalty"])),
     "sector": lambda: whole(sectors=fw.Sectors(3, [1], [-4], air=fw.Air({0: np.eye(2)},
                                                                         modes=EYE[:2]))),
+    "supports": lambda: whole(base_dof=[1, -2]),
+    "ground": lambda: whole(base_direction=EYE[0]),
     "nodal": nodal}
 
 

@@ -39,7 +39,7 @@ module fw_part
 
    !> Extents that parts share.
    character(*), parameter :: words(*) = [character(9) :: 'dof', 'pair', 'spring', 'load', &
-      'quantity', 'interface', 'order', 'motion']
+      'quantity', 'interface', 'order', 'motion', 'support', 'table']
 
    !> Goes through the parts of a model. After a failure nothing more is taken.
    type, abstract :: part_source

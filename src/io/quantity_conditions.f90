@@ -8,7 +8,7 @@ module fw_quantity_conditions
    private
 
    public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
-             goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
+             goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, moves_base, &
              scales_load, shows_contact, wears
 
 contains
@@ -27,6 +27,12 @@ contains
 
       is_response = analyses(case%analysis)%is_response
    end function is_response
+
+   pure logical function moves_base(case)
+      type(case_type), intent(in) :: case
+
+      moves_base = allocated(case%model%base_parts)
+   end function moves_base
 
    pure logical function is_mode(case)
       type(case_type), intent(in) :: case
