@@ -164,7 +164,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    1: "omega", "converged", "iterations", "residual", "seconds", "served_by", "fold"; with
    accuracy "harmonics", "instants", "error_estimate"; with a sweep over another
    parameter "parameter", of a load "load/scale", which &control has with "control/amplitude";
-   "structural/dissipation", energy per cycle, and "speed", where the case has them
+   of a base that moves "base/coefficients"; "structural/dissipation", energy per cycle, and
+   "speed", where the case has them
    (2H+1, n_observed):    "coefficients", in the order (0, c1, s1, c2, s2, ...)
    (n_observed):          "amplitude", largest magnitude over the period
    with group &stress "stress/worst" (1), "stress/amplitude", "stress/mean" and

@@ -201,6 +201,12 @@ class Model:
     harmonic : mapping, optional
         Harmonic of further loads, 0, 1, .., with the parts in phase with its cosine and its sine,
         a pair of (n_dof,) [force].
+    base_dof : sequence of int, optional
+        Supports that the group &base of a case moves, signed dof numbers.
+    base_direction : (n_dof,), optional
+        In their place the motion of all dofs with the ground.
+    load_table : (n_table, 2), optional
+        Frequencies [rad/s], and what multiplies all vibratory loads there.
     sectors : Sectors, optional
         Makes the model one of equal sectors around an axis. With matrices of nodal diameters M, C
         and K are None.
@@ -229,6 +235,8 @@ class Model:
                  circulatory: ArrayLike | None = None,
                  stiffness_unsymmetric: ArrayLike | None = None,
                  damping_unsymmetric: ArrayLike | None = None,
+                 base_dof: ArrayLike | None = None, base_direction: ArrayLike | None = None,
+                 load_table: ArrayLike | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
@@ -250,6 +258,17 @@ class Model:
                 ("static", static), ("cosine", cosine), ("sine", sine),
                 ("static_rotation", static_rotation)) if value is not None}
         self._harmonic = _waves({} if harmonic is None else harmonic, n)
+        if base_dof is not None and base_direction is not None:
+            raise InputError("base_direction: is given beside base_dof, must be one of both")
+        #: What the group &base moves, and the table of the load, by their names in a model file.
+        self._moved: dict[str, NDArray[Any]] = {}
+        if base_dof is not None:
+            self._moved["base/dof"] = dofs("base_dof", base_dof, (None,), n)
+        if base_direction is not None:
+            self._moved["base/direction"] = array("base_direction", base_direction, (n,))
+        if load_table is not None:
+            self._moved["load/table"] = np.ascontiguousarray(
+                array("load_table", load_table, (None, 2)))
         if contact is not None and not isinstance(contact, ContactPairs):
             raise InputError(f"contact: is a {type(contact).__name__}, must be ContactPairs")
         self.contact = None if contact is None else contact.checked(n)
@@ -412,6 +431,7 @@ class Model:
             found = {name: file[name][()] for name in (
                 "mass", "stiffness", "damping", "stiffness_rotation", *_MATRICES,
                 *_CONTACT, *_LOADS, "contact/law", "contact/normal_law", "contact/table",
+                "base/dof", "base/direction", "load/table",
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
             try:
@@ -422,6 +442,8 @@ class Model:
                     sectors=read_sectors(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
                     **{name: found.get(name) for name in _MATRICES},
+                    base_dof=found.get("base/dof"), base_direction=found.get("base/direction"),
+                    load_table=found.get("load/table"),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -475,7 +497,7 @@ class Model:
 
     def _datasets(self) -> dict[str, NDArray[Any]]:
         """What a session takes as parts of a model, by the names in a model file."""
-        found: dict[str, NDArray[Any]] = dict(self._matrices)
+        found: dict[str, NDArray[Any]] = {**self._matrices, **self._moved}
         found.update((name, self._loads[argument]) for name, argument in _LOADS.items()
                      if argument in self._loads)
         if self._harmonic:

@@ -344,10 +344,41 @@ class Load(TypedDict, total=False):
     term_phase: ArrayLike
     #: times the frequency of the term [rad/s] to this power; 2: an unbalance (default: 0)
     term_power: ArrayLike
+    #: points of a table by which all vibratory loads are multiplied; 0 switches that of a file off
+    #: (default: of the file, else 0)
+    n_table: int
+    #: [rad/s] where the table has points, rising; linear between them, refused beyond (default: of
+    #: the file, else required with n_table)
+    table_frequency: ArrayLike
+    #: factor of the loads there (default: of the file, else required with n_table)
+    table_scale: ArrayLike
     #: multiplies the static load, that of rotation included (default: 1)
     static_scale: float
     #: multiplies all vibratory loads (default: 1)
     harmonic_scale: float
+
+
+class Base(TypedDict, total=False):
+    """Group &base: motion of the supports, or of the ground."""
+
+    #: harmonic motions that add up (default: 0)
+    n_terms: int
+    #: supports, dofs that move alike; negative: the other way (default: of the file, else
+    #: direction)
+    dof: ArrayLike
+    #: motion of all dofs with the ground, in place of dof (default: of the file)
+    direction: ArrayLike
+    #: what the amplitudes are of (default: 'displacement')
+    motion: Literal["displacement", "velocity", "acceleration"]
+    #: 0 to n_harmonics (default: 1)
+    harmonic: ArrayLike
+    #: [L] of each term, over the units of time to the first or second power for a velocity or an
+    #: acceleration (required with n_terms)
+    amplitude: ArrayLike
+    #: [degrees] of cos(n omega t + phase) (default: 0)
+    phase: ArrayLike
+    #: what is observed: motion beside the base, or with it (supports alone) (default: 'relative')
+    frame: Literal["relative", "absolute"]
 
 
 class Harmonics(TypedDict, total=False):
@@ -594,6 +625,7 @@ class Groups(TypedDict, total=False):
     spring: Spring
     polynomial: Polynomial
     load: Load
+    base: Base
     harmonics: Harmonics
     sweep: Sweep
     solver: Solver

@@ -41,7 +41,8 @@ def whole(**more: Any) -> fw.Model:
                     stiffness_rotation=EYE, coriolis=0.0 * EYE, structural_damping=0.01 * EYE,
                     circulatory=0.0 * EYE, stiffness_unsymmetric=EYE, damping_unsymmetric=EYE,
                     harmonic={2: (EYE[0], EYE[1])},
-                    observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
+                    observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N",
+                   load_table=[[1.0, 0.5], [2.0, 1.5]], **more)
 
 
 def nodal() -> fw.Model:
@@ -58,6 +59,8 @@ MODELS = {
                                             normal_law=["power"])),
     "sector": lambda: whole(sectors=fw.Sectors(3, [1], [-4], air=fw.Air({0: np.eye(2)},
                                                                         modes=EYE[:2]))),
+    "supports": lambda: whole(base_dof=[1, -2]),
+    "ground": lambda: whole(base_direction=EYE[0]),
     "nodal": nodal}
 
 

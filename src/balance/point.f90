@@ -62,6 +62,8 @@ module fw_point
       real(wp) :: place = 0.0_wp
       !> Factor of the vibratory loads, as load%harmonic_scale is one.
       real(wp) :: load_scale = 1.0_wp
+      !> Fourier coefficients of the base (2H+1), where one moves [length].
+      real(wp), allocatable :: base(:)
       !> Amplitude that was asked for, where the load is found for it [length].
       real(wp) :: control = 0.0_wp
       !> Fourier coefficients (0, c1, s1, ...) of the observed quantities (2H+1, n_observed).

@@ -210,6 +210,8 @@ contains
       select case (phrase)
       case ('a case without contact pairs')
          asked = .not. pairs
+      case ('group &base')
+         asked = allocated(case%model%base_parts)
       case ('elements beside pairs and springs')
          asked = case%elements%n_elements() > 0
       case ("contact%memory = 'carried'")

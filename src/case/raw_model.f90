@@ -1,6 +1,7 @@
 !> What a model consists of before anything is put together, whatever its source, and the table of
 !> its parts: a row each, bound to the component that holds it.
 module fw_raw_model
+   use fw_base_motion, only: base_motion
    use fw_contact_data, only: contact_type, spring_type
    use fw_cyclic_parts, only: cyclic_parts
    use fw_elements, only: element_list
@@ -46,6 +47,8 @@ module fw_raw_model
       !> Harmonics that loads act in (m), and their cosine and sine parts (n_dof, m) [force].
       integer, allocatable :: load_harmonic(:)
       real(wp), allocatable :: harmonic_cosine(:, :), harmonic_sine(:, :)
+      !> Frequencies [rad/s], and what multiplies all vibratory loads there (n_table).
+      real(wp), allocatable :: table_frequency(:), table_scale(:)
       !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
       real(wp), allocatable :: coriolis(:, :)
       type(stress_parts) :: stress
@@ -54,6 +57,8 @@ module fw_raw_model
       !> Of any shape (n_dof, n_dof): stiffness per rotation speed, stiffness and damping.
       real(wp), allocatable :: circulatory(:, :), stiffness_unsymmetric(:, :), &
          damping_unsymmetric(:, :)
+      !> Motion of the supports or of the ground: of the model which, of the case how.
+      type(base_motion) :: base
    contains
       procedure :: order
       procedure :: bind_parts
@@ -83,6 +88,7 @@ contains
       call bind_springs(self%springs, to)
       call bind_elements(self%elements, to)
       call bind_loads(self, to)
+      call bind_base(self, to)
       call bind_observed(self, to)
       call self%cyclic%bind_parts(to)
       call self%stress%bind_parts(to)
@@ -242,8 +248,15 @@ contains
       class(raw_model), intent(inout) :: self
       class(part_source), intent(inout) :: to
       integer, allocatable :: found(:)
+      real(wp), allocatable :: table(:, :)
       type(part_type) :: harmonics
 
+      call to%bind(part('load/table', 'table 2', 'frequency [rad/s], and what multiplies all '// &
+                        'vibratory loads there', storage=by_columns), table)
+      if (allocated(table)) then
+         self%table_frequency = table(1, :)
+         self%table_scale = table(2, :)
+      end if
       call to%bind(part('load/static', 'dof', 'constant load'), self%load_static)
       call to%bind(part('load/cosine', 'dof', 'in phase with cos(omega t)'), self%load_cosine)
       call to%bind(part('load/sine', 'dof', 'in phase with sin(omega t)'), self%load_sine)
@@ -292,6 +305,17 @@ contains
          self%observe_matrix(i, abs(dof(i))) = real(sign(1, dof(i)), wp)
       end do
    end subroutine bind_observed
+
+   !> What group &base moves.
+   subroutine bind_base(self, to)
+      class(raw_model), intent(inout) :: self
+      class(part_source), intent(inout) :: to
+
+      call to%bind(part('base/dof', 'support', 'supports that &base moves, signed dof numbers'), &
+                   self%base%dof)
+      call to%bind(part('base/direction', 'dof', 'in their place motion of all dofs with the '// &
+                        'ground'), self%base%direction)
+   end subroutine bind_base
 
    !> What pictures are made of.
    subroutine note_mesh(to)

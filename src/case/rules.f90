@@ -171,6 +171,16 @@ module fw_rules
                 "use contact%law = 'penalty'")]
 
    !> Groups of elements that are neither pairs nor springs.
+   !> Loads of supports are those of stiffness, damping and mass; only pairs and springs are told of
+   !> what moves with them.
+   type(rule_type), parameter :: of_base(*) = [ &
+      rule_type('group &base', hysteretic, 'use viscous damping, or give the load of the base'), &
+      rule_type('group &base', matrices_alone, 'give the load that the base makes'), &
+      rule_type('group &base', 'sweep%speed_order', 'give model%rotation_speed'), &
+      rule_type('group &base', 'elements beside pairs and springs', &
+                'give the load that the base makes'), &
+      rule_type('group &base', 'group &stress', 'give the load that the base makes')]
+
    type(rule_type), parameter :: of_elements(*) = [ &
       rule_type('elements beside pairs and springs', "case%analysis = 'time'", &
                 "use 'frf' or 'point'"), &
@@ -205,7 +215,7 @@ module fw_rules
                 'stress without motion changes with it: give single speeds')]
 
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
-                                             of_matrices, of_laws, of_elements, of_wear, &
+                                             of_matrices, of_laws, of_base, of_elements, of_wear, &
                                              of_derivatives, of_stress]
 
 contains

@@ -63,6 +63,9 @@ contains
       if (case%sweep%speed_order > 0.0_wp) point%speed = request%omega/case%sweep%speed_order
       point%place = request%place()
       point%load_scale = case%model%harmonic_scale*system%load_factor(static=.false.)
+      if (allocated(case%model%base_parts)) then
+         point%base = case%model%motion_of_base(point%omega, point%load_scale, n_harmonics)
+      end if
       point%n_harmonics = n_harmonics
       point%n_time = system%problem%fourier%n_time
       point%converged = report%converged

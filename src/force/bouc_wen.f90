@@ -201,13 +201,14 @@ contains
       class(bouc_wen_law), intent(in) :: self
       integer, intent(in) :: element
       type(displacement_path), intent(inout) :: path
-      real(wp) :: way(path%n_turns), z, z_end, log_carry
+      real(wp) :: z, z_end, log_carry
       real(wp) :: middle, w, slope
       type(anchor_type) :: next
       integer :: k
 
-      way = (path%y_turn(2:path%n_turns + 1) - path%y_turn(:path%n_turns))/path%limit
-      associate (n => self%exponent(element), beta => self%beta(element))
+      associate (n => self%exponent(element), beta => self%beta(element), &
+                 way => path%way(:path%n_turns))
+         way = (path%y_turn(2:path%n_turns + 1) - path%y_turn(:path%n_turns))/path%limit
          call find_start(n, beta, way, z)
          call march(n, beta, way, z, z_end, log_carry)
          path%repeats = .true.

@@ -126,7 +126,7 @@ contains
       class(iwan_law), intent(in) :: self
       integer, intent(in) :: element
       type(displacement_path), intent(inout) :: path
-      integer :: stack(size(path%anchor)), depth, k
+      integer :: depth, k
       real(wp) :: direction, next
 
       depth = 0
@@ -134,27 +134,28 @@ contains
       do k = 1, path%n_turns
          next = sign(1.0_wp, path%y_turn(k + 1) - path%y_turn(k))
          ! Turning points that round-off puts upside down are none.
-         if (k == 1 .or. direction*next < 0.0_wp) call turn(self, element, path, k, direction, &
-                                                            stack, depth)
+         if (k == 1 .or. direction*next < 0.0_wp) then
+            call turn(self, element, path, k, direction, depth)
+         end if
          direction = next
-         call advance(self, element, path, k, direction, stack, depth)
+         call advance(self, element, path, k, direction, depth)
       end do
    end subroutine follow
 
    !> An anchor at a turning point, at the end of the branch on top.
-   pure subroutine turn(self, element, path, k, direction, stack, depth)
+   pure subroutine turn(self, element, path, k, direction, depth)
       class(iwan_law), intent(in) :: self
       integer, intent(in) :: element, k
       type(displacement_path), intent(inout) :: path
       !> Of the branch, before it turns.
       real(wp), intent(in) :: direction
-      integer, intent(inout) :: stack(:), depth
+      integer, intent(inout) :: depth
       type(anchor_type) :: new
       real(wp), dimension(1) :: force, slope, carry
 
       new = anchor_type(path%turn(k), path%y_turn(k))
       if (depth > 0) then
-         new%parent = stack(depth)
+         new%parent = path%stack(depth)
          associate (old => path%anchor(new%parent))
             call self%respond(element, path%limit, old%y, old%force, direction, [new%y], force, &
                               slope, carry)
@@ -168,16 +169,16 @@ contains
       new%carry = carry(1)
       call path%add_anchor(new)
       depth = depth + 1
-      stack(depth) = path%n_anchors
+      path%stack(depth) = path%n_anchors
    end subroutine turn
 
    !> From a turning point to the next, over the loops that are closed on the way.
-   pure subroutine advance(self, element, path, k, direction, stack, depth)
+   pure subroutine advance(self, element, path, k, direction, depth)
       class(iwan_law), intent(in) :: self
       integer, intent(in) :: element, k
       type(displacement_path), intent(inout) :: path
       real(wp), intent(in) :: direction
-      integer, intent(inout) :: stack(:), depth
+      integer, intent(inout) :: depth
       real(wp) :: at, passed
       logical :: closes
 
@@ -192,12 +193,12 @@ contains
          closes = .false.
          passed = path%turn(k + 1)
          if (depth > 1) then
-            associate (before => path%anchor(stack(depth - 1)))
+            associate (before => path%anchor(path%stack(depth - 1)))
                closes = direction*(path%y_turn(k + 1) - before%y) >= 0.0_wp
                if (closes) passed = path%angle_of(before%y, k, at)
             end associate
          end if
-         call add_branch(self, element, path, k, direction, stack(depth), at, passed)
+         call add_branch(self, element, path, k, direction, path%stack(depth), at, passed)
          at = passed
          if (closes) depth = depth - 2
       end do

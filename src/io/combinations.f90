@@ -41,6 +41,15 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
+      if (case%model%waves%grows_at_rest() .and. .not. case%sweep%start > 0.0_wp .and. &
+          analyses(case%analysis)%has_points .and. .not. allocated(case%sweep%frequencies)) then
+         call fatal_error(error, '&sweep start = 0: a velocity or an acceleration of &base is '// &
+                          "no motion at the frequency 0: must be above 0, or take motion = "// &
+                          "'displacement'", status_input)
+         return
+      end if
+      call check_table(case, error)
+      if (allocated(error)) return
       associate (highest => case%model%waves%highest())
          if (.not. analyses(case%analysis)%has_points) return
          if (highest <= case%harmonics%n_harmonics) return
@@ -50,6 +59,34 @@ contains
                           'at least '//to_text(highest), status_input)
       end associate
    end subroutine check_loads
+
+   !> Beyond its ends the table of the load says nothing.
+   subroutine check_table(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: range(2)
+
+      associate (table => case%model%waves)
+         if (.not. (allocated(table%table_scale) .and. analyses(case%analysis)%has_points)) return
+         if (analyses(case%analysis)%finds_frequency .or. &
+             (analyses(case%analysis)%wears .and. case%wear%follow_resonance)) then
+            call fatal_error(error, '&load n_table does not go with an analysis that finds its '// &
+                             "frequency: use 'frf' or 'point'", status_input)
+            return
+         end if
+         range = case%sweep%start
+         if (case%sweep%end > 0.0_wp .or. allocated(case%sweep%frequencies)) then
+            range = case%sweep%range()
+         end if
+         if (range(1) >= table%table_frequency(1) .and. &
+             range(2) <= table%table_frequency(size(table%table_frequency))) return
+         call fatal_error(error, '&load table_frequency has points from '// &
+                          to_text(table%table_frequency(1))//' to '// &
+                          to_text(table%table_frequency(size(table%table_frequency)))// &
+                          ' rad/s, but the sweep goes from '//to_text(range(1))//' to '// &
+                          to_text(range(2))//' rad/s: must hold all of it', status_input)
+      end associate
+   end subroutine check_table
 
    !> Room for the blocks of all nodal diameters, complex ones and factors of the preconditioner in
    !> single precision: asked for before any of them is begun.

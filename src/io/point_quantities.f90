@@ -17,7 +17,7 @@ module fw_point_quantities
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
       follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, has_levels, &
       has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
-      is_response, scales_load, shows_contact, wears
+      is_response, moves_base, scales_load, shows_contact, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -85,6 +85,8 @@ contains
       list(n)%names_parameter = .true.
       call add('load/scale', r, '1', 'point', 'factor of the vibratory loads of the model', &
                scales_load)
+      call add('base/coefficients', r, '<length>', 'point coefficient', &
+               'Fourier coefficients 0, c1, s1, ... of the motion of the base', moves_base)
       call add('control/amplitude', r, '<length>', 'point', &
                'amplitude for which the load was found', is_controlled)
       call add('coefficients', r, '<length>', 'point coefficient observed', &
@@ -345,6 +347,8 @@ contains
          values = [point%place]
       case ('load/scale')
          values = [point%load_scale]
+      case ('base/coefficients')
+         if (allocated(point%base)) values = point%base
       case ('control/amplitude')
          values = [point%control]
       case ('coefficients')

@@ -10,7 +10,8 @@ module fw_quantity_conditions
    public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
              follows_speed, goes_over, has_dampers, has_endurance, has_levels, has_stress, &
              has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
-             is_response, scales_load, shows_contact, wears
+             is_response, moves_base, scales_load, &
+             shows_contact, wears
 
 contains
 
@@ -47,6 +48,12 @@ contains
 
       is_response = analyses(case%analysis)%is_response
    end function is_response
+
+   pure logical function moves_base(case)
+      type(case_type), intent(in) :: case
+
+      moves_base = allocated(case%model%base_parts)
+   end function moves_base
 
    pure logical function is_mode(case)
       type(case_type), intent(in) :: case

@@ -3,7 +3,7 @@ module fw_read_case
    use fw_combinations, only: check_combinations
    use fw_case, only: analyses, case_type
    use fw_contact_data, only: memory_carried
-   use fw_error, only: error_type
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, sampling_uniform, usual_accuracy
    use fw_kinds, only: wp
    use fw_laws, only: law_words, usual_law
@@ -18,7 +18,8 @@ module fw_read_case
    use fw_read_elements, only: read_contact, read_elements, read_springs
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_mission, only: read_mission
-   use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model, stand_alone
+   use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, &
+      finish_model, stand_alone
    use fw_read_options, only: read_harmonics, read_mode, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
@@ -291,6 +292,7 @@ contains
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)
       call read_observed(reader, raw, case%model)
+      if (.not. reader%failed()) call raw%base%observe(case%model%observe_matrix)
       call read_control(reader, case%model, case%control)
    end subroutine read_keys
 
@@ -322,6 +324,12 @@ contains
          span = [case%resonance%start, case%resonance%end]
          by_factor = case%resonance%as == resonance_as_factor
       else if (is_of_matrices(case%over%number) .and. allocated(case%origin%raw%stiffness)) then
+         if (case%origin%raw%base%moves_supports()) then
+            call fatal_error(error, '&sweep parameter changes the matrices, which does not go '// &
+                             'with &base dof: use direction, or sweep over the frequency', &
+                             status_input)
+            return
+         end if
          case%varied = case%over%number
          if (all(case%origin%wanted /= case%varied)) then
             case%origin%wanted = [case%origin%wanted, case%varied]
@@ -422,6 +430,7 @@ contains
                          .not. reader%given('spring', 'n_springs')
       call read_loads(reader, options, raw, terms)
       if (reader%has_group('stress')) call case%stress%take(raw%stress, options%rotation_speed)
+      call read_motion(reader, case%model%cyclic%is_cyclic, raw, case%contact, case%springs)
       wanted = case%sensitivity%parameters
       if (case%varied > 0) then
          if (all(wanted /= case%varied)) wanted = [wanted, case%varied]
@@ -430,6 +439,9 @@ contains
          ! The matrices may be what the sweep goes over, which is read after them.
          allocate (case%origin)
       end if
+      if (raw%base%moves_supports() .and. any(is_of_matrices(wanted))) call reader%refuse( &
+         'base', 'dof', 'moves supports by the matrices of the case: parameters that change '// &
+         'these do not go with it; use direction, or load%harmonic_scale')
       call finish_model(reader, options, raw, terms, case%model, case%origin, error, wanted)
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)

@@ -8,16 +8,17 @@ module fw_read_model
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_hdf5, only: has_attribute, hdf5_file, read_attribute
-   use fw_load_terms, only: load_terms
+   use fw_load_terms, only: add_wave, load_terms
    use fw_matrix_checks, only: check_entries, check_matrix, check_skew, check_vector
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: read_model_hdf5
    use fw_raw_model, only: raw_model
    use fw_model_forming, only: finish_structure, form_matrices, goes_alone, model_origin
-   use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads, source_words, &
-      source_inline, source_hdf5, source_matrix_market, source_memory
+   use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads, bind_table, &
+      source_words, source_inline, source_hdf5, source_matrix_market, source_memory
    use fw_paths, only: resolve_path
+   use fw_read_base, only: check_supports, read_motion => read_base
    use fw_read_nodal, only: finish_nodal
    use fw_read_waves, only: gather_waves, read_terms
    use fw_reader, only: reader_type
@@ -27,7 +28,7 @@ module fw_read_model
    implicit none (type, external)
    private
 
-   public :: read_model, read_loads, finish_model, find_unit_system, stand_alone
+   public :: read_model, read_loads, read_motion, finish_model, find_unit_system, stand_alone
 
    !> HDF5 can crash over a damaged file: reading is tried in a process of its own first.
    type, extends(trial_type) :: model_trial
@@ -236,8 +237,62 @@ contains
 
       call bind_loads(reader, raw%load_static, raw%load_cosine, raw%load_sine)
       call read_terms(reader, terms)
+      call read_table(reader, raw)
       call options%bind_scales(reader)
    end subroutine read_loads
+
+   !> The table of the frequency; that of a file stays where nothing is given.
+   subroutine read_table(reader, raw)
+      type(reader_type), intent(inout) :: reader
+      type(raw_model), intent(inout) :: raw
+      integer :: k, n, n_file
+
+      n_file = 0
+      if (allocated(raw%table_frequency)) n_file = size(raw%table_frequency)
+      n = n_file
+      if (reader%given('load', 'table_frequency') .and. .not. reader%given('load', 'n_table')) then
+         call reader%refuse('load', 'n_table', 'is missing: must be the number of points')
+      end if
+      if (reader%given('load', 'n_table') .and. allocated(raw%table_frequency)) then
+         deallocate (raw%table_frequency, raw%table_scale)
+      end if
+      call bind_table(reader, n, raw%table_frequency, raw%table_scale)
+      if (reader%failed()) return
+      if (n == 0) then
+         if (allocated(raw%table_frequency)) deallocate (raw%table_frequency)
+         if (allocated(raw%table_scale)) deallocate (raw%table_scale)
+         return
+      end if
+      if (n == 1) call reader%refuse('load', 'n_table', '= 1: must be 0, or 2 points at least')
+      do k = 2, n
+         if (raw%table_frequency(k) > raw%table_frequency(k - 1)) cycle
+         call reader%refuse('load', 'table_frequency', 'does not rise at point '//to_text(k)// &
+                            ': must rise from point to point')
+         return
+      end do
+   end subroutine read_table
+
+   !> With a table all vibratory loads are waves, which it multiplies.
+   pure subroutine take_table(raw, model)
+      type(raw_model), intent(in) :: raw
+      type(model_type), intent(inout) :: model
+      integer :: w
+
+      if (.not. allocated(raw%table_scale)) return
+      w = model%waves%place(1, 0)
+      if (w == 0) then
+         call add_wave(1, 0, size(model%load_cosine), model%waves, model%load_wave)
+         w = model%waves%n_waves()
+      end if
+      model%load_wave(:, 2*w - 1) = model%load_wave(:, 2*w - 1) + model%load_cosine
+      model%load_wave(:, 2*w) = model%load_wave(:, 2*w) + model%load_sine
+      model%load_cosine = 0.0_wp
+      model%load_sine = 0.0_wp
+      model%waves%table_frequency = raw%table_frequency
+      model%waves%table_scale = raw%table_scale
+      model%base_waves%table_frequency = raw%table_frequency
+      model%base_waves%table_scale = raw%table_scale
+   end subroutine take_table
 
    !> Check the parts and put them together: rotation, damping, scales.
    subroutine finish_model(reader, options, raw, terms, model, origin, error, wanted)
@@ -262,6 +317,8 @@ contains
       model%static_scale = options%static_scale
       if (allocated(model%load_wave)) model%load_wave = options%harmonic_scale*model%load_wave
       if (allocated(raw%cyclic%nodal)) then
+         if (allocated(raw%table_scale)) call reader%refuse('load', 'n_table', 'does not go '// &
+            'with matrices of nodal diameters: give a load that holds at all frequencies')
          call finish_nodal(reader, options, raw, static, model, error)
          return
       end if
@@ -277,6 +334,10 @@ contains
          origin%wanted = wanted
       end if
       call form_matrices(options, raw, static, model)
+      call check_supports(reader, raw%base, model)
+      if (reader%failed()) return
+      call raw%base%apply(options%harmonic_scale, options%static_scale, model)
+      call take_table(raw, model)
       ! Large ones make room for what is to come.
       if (size(wanted) == 0 .and. .not. allocated(origin)) then
          deallocate (raw%mass, raw%stiffness)

@@ -13,7 +13,7 @@ module fw_load_terms
    implicit none (type, external)
    private
 
-   public :: load_terms, add_wave
+   public :: load_terms, add_wave, turned
 
    !> More terms, a higher harmonic or a higher power are taken for a mistake.
    integer, parameter :: most_terms = 1000000, most_harmonic = 100000, most_power = 9

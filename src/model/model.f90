@@ -50,7 +50,12 @@ module fw_model
       real(wp), allocatable :: load_wave(:, :)
       !> Factors that are in the vibratory and in the static loads.
       real(wp) :: harmonic_scale = 1.0_wp, static_scale = 1.0_wp
+      !> Motion of the base, without these factors: its waves, a constant, and cosine and sine parts
+      !> (1 + 2 n_waves); not allocated where no base moves.
+      type(load_waves) :: base_waves
+      real(wp), allocatable :: base_parts(:)
    contains
+      procedure :: motion_of_base
       procedure :: load_columns
       procedure :: at_frequency
       procedure :: n_observed
@@ -103,6 +108,27 @@ contains
          total = factor*matrix
       end if
    end subroutine add
+
+   !> Displacement of the base (0, c1, s1, ..) (2H+1) [length].
+   pure function motion_of_base(self, omega, scale, n_harmonics) result(coefficients)
+      class(model_type), intent(in) :: self
+      !> [rad/s]
+      real(wp), intent(in) :: omega
+      !> Factor of the vibration.
+      real(wp), intent(in) :: scale
+      integer, intent(in) :: n_harmonics
+      real(wp) :: coefficients(2*n_harmonics + 1)
+      integer :: n, w
+
+      coefficients = 0.0_wp
+      coefficients(1) = self%static_scale*self%base_parts(1)
+      do w = 1, self%base_waves%n_waves()
+         n = self%base_waves%harmonic(w)
+         if (n > n_harmonics) cycle
+         coefficients(2*n:2*n + 1) = coefficients(2*n:2*n + 1) + scale* &
+            self%base_waves%factor(w, n, n*omega)*self%base_parts(2*w:2*w + 1)
+      end do
+   end function motion_of_base
 
    !> Observed quantities of all sectors that are solved for.
    pure integer function n_observed(self)

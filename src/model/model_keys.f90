@@ -8,7 +8,7 @@ module fw_model_keys
 
    public :: model_options
    public :: source_words, source_inline, source_hdf5, source_matrix_market, source_memory
-   public :: bind_order, bind_matrices, bind_loads
+   public :: bind_order, bind_matrices, bind_loads, bind_table
 
    character(*), parameter :: source_words(*) = &
       [character(13) :: 'inline', 'hdf5', 'matrix_market', 'memory']
@@ -152,6 +152,29 @@ contains
       end function load_key
 
    end subroutine bind_loads
+
+   !> Within group &load: a factor of all vibratory loads that depends on the frequency.
+   subroutine bind_table(keys, n_table, frequency, scale)
+      class(key_visitor), intent(inout) :: keys
+      !> Of the model file on entry.
+      integer, intent(inout) :: n_table
+      !> (n_table)
+      real(wp), allocatable, intent(inout) :: frequency(:), scale(:)
+      logical :: needed
+
+      call keys%bind(key('n_table', 'points of a table by which all vibratory loads are '// &
+                         'multiplied; 0 switches that of a file off', from_to(0, largest), &
+                         absent='of the file'), n_table)
+      call keys%set_size('n_table', n_table)
+      needed = n_table > 0
+      call keys%bind(key('table_frequency', 'where the table has points, rising; linear '// &
+                         'between them, refused beyond', at_least(0.0_wp), unit='rad/s', &
+                         shape='n_table', absent='of the file, else required with n_table'), &
+                     frequency, needed .and. .not. allocated(frequency))
+      call keys%bind(key('table_scale', 'factor of the loads there', shape='n_table', &
+                         absent='of the file, else required with n_table'), scale, &
+                     needed .and. .not. allocated(scale))
+   end subroutine bind_table
 
    !> Last of the group: they multiply what the file or the keys before gave.
    subroutine bind_scales(self, keys)

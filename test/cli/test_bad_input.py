@@ -115,7 +115,7 @@ def test_missing_group(fw_run, group):
 @pytest.mark.parametrize("override, expected", [
     # Of another group, and a part of longer names.
     ("harmonics%stability=true", ["has no key stability; it is a key of &sweep"]),
-    ("load%harmonic=3", ["has no key harmonic; did you mean ", "term_harmonic", "harmonic_scale"]),
+    ("load%scale=3", ["has no key scale; did you mean ", "static_scale", "harmonic_scale"]),
     ("solver%tolerence=1", ["has no key tolerence", "did you mean tolerance?"]),
     ("solvr%tolerance=1", ["there is no group &solvr", "did you mean solver?"]),
     ("solver%tolerance=-1", ["&solver tolerance = -1", "above 0"]),

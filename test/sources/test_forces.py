@@ -7,6 +7,8 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 EVENTS = SRC / "force" / "event"
 #: Paths of an oscillator under friction, which share the roots of the events.
 OSCILLATOR = SRC / "force" / "oscillator"
+#: Paths of one displacement, of which turning points are such roots.
+PATHS = SRC / "force" / "path"
 #: The one module of the located events that the rest may name.
 INTERFACE = "fw_event_contact"
 #: The list of the laws: a word and a line of construction each.
@@ -33,7 +35,7 @@ def test_nothing_outside_names_a_kernel_of_the_events() -> None:
     named = {
         str(path.relative_to(SRC)): sorted(uses(path) & behind)
         for path in SRC.rglob("*.f90")
-        if not {EVENTS, OSCILLATOR} & set(path.parents) and uses(path) & behind
+        if not {EVENTS, OSCILLATOR, PATHS} & set(path.parents) and uses(path) & behind
     }
     assert named == {}
 

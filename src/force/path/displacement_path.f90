@@ -57,9 +57,16 @@ module fw_displacement_path
       real(wp) :: contraction = 1.0_wp
       !> Change of the force over the period.
       real(wp) :: drift = 0.0_wp
+      !> Room for who follows it: open branches, ways between turning points.
+      integer, allocatable :: stack(:)
+      real(wp), allocatable :: way(:)
+      !> Room for who integrates it: waves at the points of a block (0:degree, block), and three
+      !> sets of integrals (0:degree, cosine and sine, 3), of a degree of their own.
+      real(wp), allocatable :: cosines(:, :), sines(:, :), sums(:, :, :)
       real(wp), allocatable, private :: grid(:, :), roots(:)
    contains
       procedure :: reserve
+      procedure :: reserve_waves
       procedure :: take
       procedure :: begin
       procedure :: add_anchor
@@ -84,19 +91,35 @@ contains
       allocate (self%turn(n_roots + 1), self%y_turn(n_roots + 1), source=0.0_wp)
       ! A turning point closes one loop at most; every branch and every crossing may have a break.
       allocate (self%anchor(n_roots + 1), self%piece(6*n_roots + 6))
+      allocate (self%stack(n_roots + 1), source=0)
+      allocate (self%way(n_roots), source=0.0_wp)
    end subroutine reserve
 
-   !> A displacement, and its turning points.
-   pure subroutine take(self, y, limit)
+   !> Room for integrals with the waves 0..degree, points of a block at a time; what there is serves
+   !> where it is large enough.
+   pure subroutine reserve_waves(self, degree, block)
       class(displacement_path), intent(inout) :: self
-      !> (0:degree, cosine and sine)
-      real(wp), intent(in) :: y(0:, :), limit
+      integer, intent(in) :: degree, block
+      integer :: n
+
+      n = max(degree, self%degree)
+      if (allocated(self%cosines)) then
+         if (ubound(self%cosines, 1) >= n) return
+         deallocate (self%cosines, self%sines, self%sums)
+      end if
+      allocate (self%cosines(0:n, block), self%sines(0:n, block), self%sums(0:n, 2, 3), &
+                source=0.0_wp)
+   end subroutine reserve_waves
+
+   !> Turning points of the displacement y.
+   pure subroutine take(self, limit)
+      class(displacement_path), intent(inout) :: self
+      real(wp), intent(in) :: limit
       real(wp) :: slope
       integer :: first, k, n, n_grid
 
-      self%y = y
       self%limit = limit
-      self%size = sum(abs(y))
+      self%size = sum(abs(self%y))
       call differentiate(self%degree, self%y, self%rate)
       n_grid = size(self%grid, 1)
       do k = 1, n_grid
@@ -110,15 +133,19 @@ contains
       if (n < 2) n = 0
       self%n_turns = n
       if (n == 0) return
+      ! In their order until the farthest is known.
+      first = 1
       do k = 1, n
-         call value_and_slope(self%degree, self%y, self%roots(k), self%y_turn(k), slope)
+         call value_and_slope(self%degree, self%y, self%roots(k), self%way(k), slope)
+         if (abs(self%way(k)) > abs(self%way(first))) first = k
       end do
-      first = maxloc(abs(self%y_turn(:n)), dim=1)
-      self%turn(:n + 1 - first) = self%roots(first:n)
-      self%turn(n + 2 - first:n) = self%roots(:first - 1) + 2.0_wp*pi
-      self%turn(n + 1) = self%turn(1) + 2.0_wp*pi
-      self%y_turn(:n) = cshift(self%y_turn(:n), first - 1)
-      self%y_turn(n + 1) = self%y_turn(1)
+      do k = 1, n + 1
+         associate (from => modulo(first + k - 2, n) + 1)
+            self%turn(k) = self%roots(from)
+            if (first + k - 1 > n) self%turn(k) = self%turn(k) + 2.0_wp*pi
+            self%y_turn(k) = self%way(from)
+         end associate
+      end do
    end subroutine take
 
    !> Before a law follows the path.

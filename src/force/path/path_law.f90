@@ -77,6 +77,8 @@ module fw_path_law
    !> The angle from the start of a piece is the third power of a point: with chi = -0.9, where the
    !> slope begins with the power 0.2, 64 points leave 1e-10 of it.
    integer, parameter :: crowding = 3
+   !> Sets of integrals in a path.
+   integer, parameter :: one_piece = 1, coarser = 2, all_pieces = 3
    !> Change of the integrals over the largest force from one rule to the next that is none.
    real(wp), parameter :: integral_tolerance = 1.0e-11_wp
 
@@ -98,6 +100,7 @@ contains
       allocate (work%path(self%n_elements))
       do i = 1, self%n_elements
          call work%path(i)%reserve(maxval(fourier%harmonic))
+         call work%path(i)%reserve_waves(maxval(fourier%harmonic), block)
       end do
       allocate (work%rule(first_point(n_levels + 1) - 1, 2))
       do k = 1, n_levels
@@ -145,15 +148,8 @@ contains
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       integer, intent(in) :: i
-      real(wp) :: y(0:work%path(i)%degree, 2)
       integer :: h, k
 
-      y = 0.0_wp
-      do h = 1, fourier%n_retained
-         k = fourier%column(h)
-         y(fourier%harmonic(h), 1) = work%prediction(i, 1, k)
-         if (fourier%harmonic(h) > 0) y(fourier%harmonic(h), 2) = work%prediction(i, 1, k + 1)
-      end do
       work%turns(i) = 1
       work%drift(i) = 0.0_wp
       work%force(i, :, :) = 0.0_wp
@@ -162,14 +158,21 @@ contains
       work%pressure(i) = max(-work%offset(i), 0.0_wp)
       associate (path => work%path(i))
          call path%begin()
-         call path%take(y, self%mu(i)*work%pressure(i))
+         ! Harmonics that the balance leaves out keep their zeros.
+         do h = 1, fourier%n_retained
+            k = fourier%column(h)
+            path%y(fourier%harmonic(h), 1) = work%prediction(i, 1, k)
+            if (fourier%harmonic(h) > 0) path%y(fourier%harmonic(h), 2) = &
+               work%prediction(i, 1, k + 1)
+         end do
+         call path%take(self%mu(i)*work%pressure(i))
          work%state(i) = pair_open
          if (.not. path%limit > 0.0_wp) return
          work%state(i) = pair_mixed
          if (path%n_turns > 0) then
             call self%follow(i, path)
             work%drift(i) = path%drift
-         else if (.not. abs(y(0, 1)) > 0.0_wp) then
+         else if (.not. abs(path%y(0, 1)) > 0.0_wp) then
             work%state(i) = pair_stuck
          end if
          call project(self, work%rule, path, i, fourier, work%force(i, 1, :))
@@ -185,9 +188,8 @@ contains
       !> Harmonics that are wanted.
       type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: force(:)
-      real(wp), dimension(0:maxval(fourier%harmonic), 2) :: total, part
       real(wp) :: slope
-      integer :: h, k, p
+      integer :: degree, h, k, p
 
       force = 0.0_wp
       if (.not. path%limit > 0.0_wp) return
@@ -196,70 +198,76 @@ contains
                                                                force(1), slope)
          return
       end if
-      total = 0.0_wp
+      degree = maxval(fourier%harmonic)
+      call path%reserve_waves(degree, block)
+      path%sums(:, :, all_pieces) = 0.0_wp
       do p = 1, path%n_pieces
-         call settle(self, rule, path, i, p, maxval(fourier%harmonic), part)
-         total = total + part
+         call settle(self, rule, path, i, p, degree)
+         path%sums(:degree, :, all_pieces) = path%sums(:degree, :, all_pieces) + &
+                                             path%sums(:degree, :, one_piece)
       end do
       do h = 1, fourier%n_retained
          k = fourier%column(h)
          if (fourier%harmonic(h) == 0) then
-            force(k) = total(0, 1)/(2.0_wp*pi)
+            force(k) = path%sums(0, 1, all_pieces)/(2.0_wp*pi)
          else
-            force(k:k + 1) = total(fourier%harmonic(h), :)/pi
+            force(k:k + 1) = path%sums(fourier%harmonic(h), :, all_pieces)/pi
          end if
       end do
    end subroutine project
 
    !> Integrals over a piece by finer and finer rules, until they stand.
-   subroutine settle(self, rule, path, i, p, degree, sums)
+   subroutine settle(self, rule, path, i, p, degree)
       class(path_law), intent(in) :: self
       real(wp), intent(in) :: rule(:, :)
       type(displacement_path), intent(inout) :: path
       integer, intent(in) :: i, p, degree
-      real(wp), intent(out) :: sums(0:degree, 2)
-      real(wp) :: coarser(0:degree, 2), largest
-      integer :: level
+      real(wp) :: largest
+      integer :: k, level
 
-      largest = maxval(abs(path%anchor(:path%n_anchors)%force))
-      associate (piece => path%piece(p))
-         level = 1
-         do while (level < n_levels - 1 .and. n_points(level) < degree*(piece%end - piece%start))
-            level = level + 1
-         end do
-         call integrate(self, rule, path, i, p, level, degree, sums)
-         do while (level < n_levels)
-            level = level + 1
-            coarser = sums
-            call integrate(self, rule, path, i, p, level, degree, sums)
-            if (maxval(abs(sums - coarser)) <= integral_tolerance*largest) exit
-         end do
-         piece%level = level
-      end associate
+      largest = 0.0_wp
+      do k = 1, path%n_anchors
+         largest = max(largest, abs(path%anchor(k)%force))
+      end do
+      level = 1
+      do while (level < n_levels - 1 .and. &
+                n_points(level) < degree*(path%piece(p)%end - path%piece(p)%start))
+         level = level + 1
+      end do
+      call integrate(self, rule, path, i, p, level, degree)
+      do while (level < n_levels)
+         level = level + 1
+         path%sums(:degree, :, coarser) = path%sums(:degree, :, one_piece)
+         call integrate(self, rule, path, i, p, level, degree)
+         if (maxval(abs(path%sums(:degree, :, one_piece) - path%sums(:degree, :, coarser))) <= &
+             integral_tolerance*largest) exit
+      end do
+      path%piece(p)%level = level
    end subroutine settle
 
    !> Integrals of the force times the waves over a piece, by the rule of a level.
-   subroutine integrate(self, rule, path, i, p, level, degree, sums)
+   subroutine integrate(self, rule, path, i, p, level, degree)
       class(path_law), intent(in) :: self
       real(wp), intent(in) :: rule(:, :)
-      type(displacement_path), intent(in) :: path
+      type(displacement_path), intent(inout) :: path
       integer, intent(in) :: i, p, level, degree
-      real(wp), intent(out) :: sums(0:degree, 2)
-      real(wp), dimension(0:max(degree, path%degree), block) :: cosines, sines
       real(wp), dimension(block) :: angle, weight, y, force, slope, carry
-      integer :: first, k
+      integer :: first, highest, k
 
-      sums = 0.0_wp
+      highest = max(degree, path%degree)
+      path%sums(:, :, one_piece) = 0.0_wp
       do first = 1, n_points(level), block
          call points_of(rule, path%piece(p), level, first, angle, weight)
          do k = 1, block
-            call fill_waves(size(cosines, 1) - 1, angle(k), cosines(:, k), sines(:, k))
-            y(k) = value_of(path%degree, path%y, cosines(:, k), sines(:, k))
+            call fill_waves(highest, angle(k), path%cosines(:, k), path%sines(:, k))
+            y(k) = value_of(path%degree, path%y, path%cosines(:, k), path%sines(:, k))
          end do
          call answer(self, path, i, p, y, force, slope, carry)
          do k = 1, block
-            sums(:, 1) = sums(:, 1) + weight(k)*force(k)*cosines(:degree, k)
-            sums(:, 2) = sums(:, 2) + weight(k)*force(k)*sines(:degree, k)
+            path%sums(:degree, 1, one_piece) = path%sums(:degree, 1, one_piece) + &
+                                               weight(k)*force(k)*path%cosines(:degree, k)
+            path%sums(:degree, 2, one_piece) = path%sums(:degree, 2, one_piece) + &
+                                               weight(k)*force(k)*path%sines(:degree, k)
          end do
       end do
    end subroutine integrate
