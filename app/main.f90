@@ -8,14 +8,13 @@ program fw_run_program
    use fw_help, only: write_help
    use fw_signals, only: catch_interrupts
    use fw_key_text, only: write_keys
-   use fw_message_table, only: write_message_kinds
+   use fw_remark_table, only: write_message_kinds, write_remark_kinds
    use fw_run_state, only: outcome_type
    use fw_progress, only: progress_type, new_progress
    use fw_solver_options, only: unit_hertz
    use fw_read_case, only: case_input, read_input
    use fw_reader_text, only: printable
    use fw_restart_trial, only: try_restart
-   use fw_remark_table, only: write_remark_kinds
    use fw_rules, only: write_rules
    use fw_parts, only: write_parts
    use fw_run, only: check_case, run_case

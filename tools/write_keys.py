@@ -25,7 +25,7 @@ from law_table import law_table
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Pages of the user guide that have tables.
-PAGES = [ROOT / "docs" / "user-guide.md"]
+PAGES = [ROOT / "docs" / f"{name}.md" for name in ("keys", "files", "messages")]
 SETTINGS = ROOT / "python" / "fretwear" / "settings.py"
 WIDTH = 100
 

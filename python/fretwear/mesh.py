@@ -1,6 +1,6 @@
 """The group `/mesh` of a model file: a mesh, and how its points move with the reduced coordinates.
 
-See docs/user-guide.md for its datasets.
+See docs/files.md for its datasets.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The tables of keys and the summary in docs/user-guide.md against the reader and the program."""
+"""The tables of keys and the summary in the user guide against the reader and the program."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from project import PROGRAM, ROOT
 
 from fretwear import settings
 
-GUIDE = (ROOT / "docs" / "user-guide.md").read_text()
+GUIDE = "".join((ROOT / "docs" / f"{name}.md").read_text()
+                for name in ("user-guide", "keys", "files", "messages"))
 
 
 def read_keys() -> set[str]:

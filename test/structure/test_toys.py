@@ -1,5 +1,5 @@
-"""What a new law, quantity, rule, analysis, part of a model file, parameter and kind of vibration
-cost: each is added to a copy of the tree, compiled, run, and the old files that it touched are
+"""What a new law, quantity, rule, analysis, part of a model file, parameter, kind of vibration and
+load cost: each is added to a copy of the tree, compiled, run, and the old files that it touched are
 counted.
 
 A file of its own is free; a limit may only fall.
@@ -18,7 +18,7 @@ from project import ROOT
 CALLS = 6
 #: Old files that each may touch.
 LIMITS = {"law": 1, "quantity": 1, "rule": 1, "analysis": 2, "part": 2, "parameter": 1,
-          "vibration": 2}
+          "vibration": 2, "load": 2}
 
 
 class Toy:
@@ -246,8 +246,57 @@ end module fw_toy_vibration
                 "      else if (case%control%is_wanted()) then\n         allocate (walked)\n"))
 
 
+def add_load(toy):
+    """'load%swing': the acceleration of a base that everything stands on, in harmonic 1."""
+    toy.new("src/model/toy_load.f90", """\
+!> Inertia of a structure whose base swings.
+module fw_toy_load
+   use fw_kinds, only: wp
+   use fw_load_terms, only: add_wave
+   use fw_load_waves, only: load_waves
+   implicit none (type, external)
+   private
+
+   public :: add_swing
+
+contains
+
+   !> -M a in harmonic 1, for an acceleration a of all dofs.
+   pure subroutine add_swing(a, mass, waves, columns)
+      real(wp), intent(in) :: a, mass(:, :)
+      type(load_waves), intent(inout) :: waves
+      real(wp), allocatable, intent(inout) :: columns(:, :)
+      integer :: w
+
+      if (abs(a) <= 0.0_wp) return
+      w = waves%place(1, 0)
+      if (w == 0) then
+         call add_wave(1, 0, size(mass, 1), waves, columns)
+         w = waves%n_waves()
+      end if
+      columns(:, 2*w - 1) = columns(:, 2*w - 1) - a*sum(mass, dim=2)
+   end subroutine add_swing
+
+end module fw_toy_load
+""")
+    toy.change("src/model/load_terms.f90",
+               ("      integer :: fundamental = 0\n   contains\n",
+                "      integer :: fundamental = 0\n      real(wp) :: swing = 0.0_wp\n"
+                "   contains\n"),
+               ("      call keys%set_size('n_terms', self%n_terms)\n",
+                "      call keys%set_size('n_terms', self%n_terms)\n"
+                "      call keys%bind(key('swing', 'acceleration of the base'), self%swing)\n"))
+    toy.change("src/io/read_waves.f90",
+               ("   use fw_text, only: to_text\n",
+                "   use fw_text, only: to_text\n   use fw_toy_load, only: add_swing\n"),
+               ("      call terms%add_to(static, waves, columns)\n",
+                "      call terms%add_to(static, waves, columns)\n"
+                "      call add_swing(terms%swing, raw%mass, waves, columns)\n"))
+
+
 TOYS = {"law": add_law, "quantity": add_quantity, "rule": add_rule, "analysis": add_analysis,
-        "part": add_part, "parameter": add_parameter, "vibration": add_vibration}
+        "part": add_part, "parameter": add_parameter, "vibration": add_vibration,
+        "load": add_load}
 
 
 @pytest.fixture(scope="module", name="built")
@@ -415,6 +464,29 @@ def test_vibration_is_swept(built, tmp_path):
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "there.h5") as file:
         assert np.allclose(branch, file["coefficients"][:], **same)
+
+
+def test_load_acts(built, tmp_path):
+    """A base that swings by -1 loads a mass of 1 as a force of 1 does, and is scaled as one."""
+    text = RUBBING.format(law="regularised", more="")
+    found = []
+    for load in ("cosine = 2.0", "swing = -1.0, harmonic_scale = 2.0"):
+        done = run(built[0], tmp_path, "load", text.replace("cosine = 1.0", load))
+        assert done.returncode == 0, done.stderr
+        with h5py.File(tmp_path / "load.h5") as file:
+            found.append(file["coefficients"][:])
+    # Sums of one and of two columns.
+    assert np.allclose(*found, rtol=0.0, atol=1e-12 * np.abs(found[0]).max())
+    resonance = re.sub(r"&sweep.*?/\n", "&sweep start = 0.5, end = 1.5, n_points = 21 /\n", text)
+    resonance = resonance.replace("'frf'", "'resonance'")
+    scale = "&resonance parameter = 'load%harmonic_scale', start = 1.0, end = 1.5, n_points = 3 /\n"
+    peaks = []
+    for load in ("cosine = 1.0", "swing = -1.0"):
+        done = run(built[0], tmp_path, "track", resonance.replace("cosine = 1.0", load) + scale)
+        assert done.returncode == 0, done.stderr
+        with h5py.File(tmp_path / "track.h5") as file:
+            peaks.append(file["omega"][:])
+    assert np.allclose(*peaks, rtol=1e-9)
 
 
 def test_calls_before_newton(built, tmp_path):

@@ -38,7 +38,7 @@ def read_mesh(path: Path) -> RecoveryMesh:
             is_disk = "disk_parameters" in file.attrs
             if "parameters" not in file.attrs and not is_disk:
                 raise InputError(f"{path}: holds no group /mesh, so there is nothing to show a "
-                                 "displacement on (docs/user-guide.md says what it holds)")
+                                 "displacement on (docs/files.md says what it holds)")
             observe = file["observe/matrix"][()]
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {error}") from None
