@@ -13,8 +13,8 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (88500, 1000),
-    "files of src": (399, 10),
+    "lines of src": (88600, 1000),
+    "files of src": (401, 10),
     "lines of the longest file": (777, 50),
     "modules used by one file, at most": (32, 2),
     "files that name forces%pairs": (42, 0),
