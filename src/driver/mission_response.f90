@@ -3,8 +3,9 @@
 !>
 !> Flights are flown in their order, or many at a time: a jump of m flights is each block for m
 !> times half its cycles, first to last and then last to first, which leaves an error of the second
-!> order. A jump is compared with the two of half its length, which are taken; their difference, over the
-!> largest depth, is to be within wear%error_tolerance, and tells how long the next one may be.
+!> order. A jump is compared with the two of half its length, which are taken; their difference,
+!> over the largest depth, is to be within wear%error_tolerance, and tells how long the next one may
+!> be. Where it would be too short to pay, flights are flown in their order for a while.
 module fw_mission_response
    use fw_analysis, only: analysis, run_type
    use fw_block_march, only: block_type, mission_state
@@ -12,6 +13,7 @@ module fw_mission_response
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hdf5, only: hdf5_file
    use fw_kinds, only: wp
+   use fw_memory, only: require_memory
    use fw_mission_block, only: read_block
    use fw_mission_group, only: mission_record
    use fw_observer, only: observer_type
@@ -34,6 +36,9 @@ module fw_mission_response
 
    !> Change of the flights of a jump from one to the next, and the safety of the new length.
    real(wp), parameter :: largest_growth = 4.0_wp, smallest_shrink = 0.2_wp, safety = 0.8_wp
+   !> Flights from which a jump, its two halves and what is refused take fewer marches than flights
+   !> in their order; and flights in their order after a jump of so many was refused.
+   integer, parameter :: least_jump = 8, patience = 16
    !> Error of the steps within jumps, as a part of that of a jump.
    real(wp), parameter :: step_share = 0.1_wp
    !> No step is asked for a smaller one because of its jump.
@@ -160,11 +165,17 @@ contains
       call self%restart_rows%create(self%run%writer%file, self%case%contact, b, error, &
                                     of_mission=.true.)
       if (allocated(error)) return
+      call require_memory(real(self%case%contact%n_pairs, wp)*self%case%mission%n_flights, &
+                          '&mission n_flights = '//to_text(self%case%mission%n_flights)// &
+                          ' with '//to_text(self%case%contact%n_pairs)//' pairs', &
+                          'fly fewer, and go on with --restart', error)
+      if (allocated(error)) return
       self%now%depth = self%blocks(1)%joint%balance%depth
       self%now%energy = 0.0_wp*self%now%depth
       call self%record%start(self%case%mission, self%now%depth)
-      ! The first is one flight: whatever comes is measured by it.
-      self%over%next_cycles = 1.0_wp
+      ! The first flight is one by itself: whatever comes is measured by it. Below zero:
+      ! flights in their order that come before the next jump.
+      self%over%next_cycles = -1.0_wp
       self%over%options = self%blocks(1)%case%wear
       if (self%run%restart%n_rows > 0) then
          call resume(self, self%run%restart, error)
@@ -213,7 +224,7 @@ contains
             if (n > 1 .and. now%block == 0) then
                call jump(self, case, n, is_cut, error)
             else
-               if (now%block == 0) self%over%next_cycles = 2.0_wp
+               if (now%block == 0) call wait_for_jump(self%over%next_cycles)
                call fly_one(self, case, now%block + 1, .not. is_cut, error)
                if (is_cut .and. .not. allocated(error) .and. allocated(self%row)) then
                   call write_rows(self, .true., error)
@@ -230,14 +241,24 @@ contains
       type(case_type), intent(in) :: case
 
       n = min(free_flights(self, case), case%mission%n_flights - self%now%flight)
+      if (case%mission%flights_per_jump == 0 .and. n < least_jump) n = 1
    end function wanted_flights
+
+   !> One flight less before the next jump.
+   pure subroutine wait_for_jump(next)
+      real(wp), intent(inout) :: next
+
+      if (next > 0.0_wp) return
+      next = next + 1.0_wp
+      if (next >= 0.0_wp) next = least_jump
+   end subroutine wait_for_jump
 
    !> The same without an end.
    pure integer function free_flights(self, case) result(n)
       type(mission_analysis), intent(in) :: self
       type(case_type), intent(in) :: case
 
-      n = nint(self%over%next_cycles)
+      n = max(1, nint(self%over%next_cycles))
       if (case%mission%flights_per_jump > 0) n = case%mission%flights_per_jump
    end function free_flights
 
@@ -359,9 +380,9 @@ contains
          call self%blocks(b)%keep()
       end do
       do
-         if (n == 1) then
-            ! No shorter one: its failure is that of the run.
-            self%over%next_cycles = 2.0_wp
+         if (n == 1 .or. (by_error .and. n < least_jump)) then
+            ! No shorter one pays: the failure of a flight is that of the run.
+            self%over%next_cycles = -real(patience, wp)
             call fly_one(self, case, 1, .true., error)
             return
          end if
@@ -406,7 +427,7 @@ contains
       self%record%n_jumps = self%record%n_jumps + 1
       if (by_error) then
          self%record%error = self%record%error + difference
-         self%over%next_cycles = max(2.0_wp, real(int(factor*n), wp))
+         self%over%next_cycles = real(max(least_jump, int(factor*n)), wp)
       end if
       self%n_in_jump = n
       call write_rows(self, is_cut, error)

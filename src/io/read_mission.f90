@@ -38,9 +38,10 @@ contains
       call mission%bind_keys(reader, are_texts)
       if (reader%failed()) return
       if (mission%n_blocks == 0) then
-         if (reader%has_group(group) .and. .not. reader%given(group, 'n_blocks')) &
+         if (reader%has_group(group) .and. .not. reader%given(group, 'n_blocks')) then
             call reader%refuse(group, 'n_blocks', 'is missing: must be the number of blocks of '// &
                                'a flight, or 0 for no mission')
+         end if
          return
       end if
       if (.not. are_texts) call reader%refuse(group, 'change', 'and name must be texts in quotes')

@@ -134,7 +134,8 @@ contains
       if (len(there) > 0) then
          call fatal_error(error, file%path//': its run had '//there//', this case has '//here// &
                           ': only wear%n_cycles, mission%n_flights, wear%max_steps and the '// &
-                          'name of the result may change; take the value back, or start anew', status_input)
+                          'name of the result may change; take the value back, or start '// &
+                          'anew', status_input)
          return
       end if
       call read_dataset(file, '/restart/pairs', constants, error)

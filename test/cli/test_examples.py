@@ -51,6 +51,8 @@ NUMBERS = {
                            ("wear/depth", None, 1, 0.0, 0.0)],
     "wear/oscillator.nml": [("wear/depth", None, 0, 0.294758, 2e-6),
                             ("omega", None, Ellipsis, 0.996488, 1e-6)],
+    # Depth after fifty flights in their order.
+    "wear/mission.nml": [("wear/depth", None, 0, 0.1622059, 1e-3)],
     "blade_sector/frf.nml": [("amplitude", None, 0, 0.8830621, 1e-6)],
     "blade_sector/frf_stuck.nml": [("amplitude", None, 0, 1.6722078, 1e-6)],
     # Where pairs begin to slip jumps between 128 instants, which roughens the branch: which of its
