@@ -20,7 +20,7 @@ Groups = dict[str, dict[str, Any]]
 #: What is added to the case for each column, and a word that a refusal of it holds.
 COLUMNS: dict[str, tuple[Groups, str]] = {
     "events located": ({"harmonics": {"sampling": "events"}}, "sampling"),
-    "two directions": ({"contact": {"side_1": [1, 2, 0]}}, "two"),
+    "two directions": ({"contact": {"side_1": [1, 2, 0]}}, "t2"),
     "normal dof": ({"contact": {"side_1": [1, 0, 2], "normal_load": None}}, "normal"),
     "nonlinear mode": ({"case": {"analysis": "mode"}, "mode": {"number": 1, "start": 0.1,
                                                                "end": 1.0}}, "mode"),

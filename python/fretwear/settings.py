@@ -12,9 +12,10 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["UNITS", "CaseGroup", "Contact", "Control", "Cyclic", "Groups", "Harmonics", "Load",
-           "Mission", "Mode", "Output", "PseudoTime", "Resonance", "Sensitivity", "Solver",
-           "Spring", "Structure", "Sweep", "Time", "Wear"]
+__all__ = ["UNITS", "Base", "CaseGroup", "Contact", "Control", "Cyclic", "Damper", "Groups",
+           "Harmonics", "Load", "Mission", "Mode", "Output", "Polynomial", "PseudoTime",
+           "Resonance", "Sensitivity", "Solver", "Spring", "Stress", "Structure", "Sweep", "Time",
+           "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -51,6 +52,9 @@ UNITS: dict[str, str] = {
     "load%sine": "F",
     "load%term_amplitude": "F",
     "load%term_phase": "degrees",
+    "load%table_frequency": "rad/s",
+    "base%amplitude": "L",
+    "base%phase": "degrees",
     "sweep%start": "unit",
     "sweep%end": "unit",
     "sweep%frequency": "unit",
@@ -61,6 +65,8 @@ UNITS: dict[str, str] = {
     "mode%amplitudes": "L",
     "mode%start": "L",
     "mode%end": "L",
+    "stress%endurance": "F/L^2",
+    "stress%ultimate": "F/L^2",
     "control%amplitude": "L",
 }
 
@@ -109,7 +115,8 @@ class Resonance(_Resonance, total=False):
                        "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
                        "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
                        "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
-                       "model%loss_factor"]
+                       "contact%normal_coefficient", "contact%reference_force",
+                       "polynomial%coefficient", "damper%coefficient", "model%loss_factor"]
     #: first value, or factor; only: analysis = 'resonance' (required, else 0)
     start: float
     #: last value, or factor; only: analysis = 'resonance' (required, else 0)
@@ -203,6 +210,21 @@ class Contact(TypedDict, total=False):
     #: 'dlft')
     law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised", "iwan",
                  "bouc_wen"] | Sequence[str]
+    #: how pairs with a normal dof press: a spring, normal_coefficient d**normal_exponent,
+    #: reference_force exp(d/decay_length), a table; only: law = 'penalty', 'regularised' (default:
+    #: 'unilateral')
+    normal_law: Literal["unilateral", "power", "exponential", "table"] | Sequence[str]
+    #: points of the table; only: normal_law = 'table' (default: of the file, else 0)
+    n_table: int
+    #: [L] of the points, in ascending order; only: normal_law = 'table' (default: of the file, else
+    #: required)
+    overclosure: ArrayLike
+    #: [F] of the points, from 0 up: linear between them, beyond the last with its slope; only:
+    #: normal_law = 'table' (default: of the file, else required)
+    force: ArrayLike
+    #: normal_coefficient, reference_force and force are pressures: times area; only: normal_law
+    #: other than 'unilateral' (default: .false.)
+    normal_per_area: bool
     #: dofs of t1, t2, n on one side; 0: none, negative: with its sign turned (default: of the file,
     #: else required)
     side_1: ArrayLike
@@ -320,6 +342,27 @@ class Polynomial(TypedDict, total=False):
     dof: ArrayLike
 
 
+class Damper(TypedDict, total=False):
+    """Group &damper: nonlinear dampers."""
+
+    #: required with coefficient; 0 switches the dampers of a file off (default: of the file, else
+    #: 0)
+    n_dampers: int
+    #: dof on one side (default: of the file, else required)
+    side_1: ArrayLike
+    #: dof on the other side, 0: ground (default: of the file, else 0)
+    side_2: ArrayLike
+    #: sector of side 2, counted from that of side 1; only: &cyclic (default: of the file, else 0)
+    sector_2: ArrayLike
+    #: c of the force c u**position_power |v|**(power - 1) v, v = du/dt (default: of the file, else
+    #: required)
+    coefficient: ArrayLike
+    #: of the velocity: 1 viscous, 2 drag (default: of the file, else 1)
+    power: ArrayLike
+    #: of the displacement; odd ones have even harmonics (default: of the file, else 0)
+    position_power: ArrayLike
+
+
 class Load(TypedDict, total=False):
     """Group &load: static and harmonic loads."""
 
@@ -423,7 +466,9 @@ class Sweep(_Sweep, total=False):
     parameter: Literal["frequency", "load%harmonic_scale", "load%static_scale", "contact%mu",
                        "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
                        "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
-                       "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness"]
+                       "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
+                       "contact%normal_coefficient", "contact%reference_force",
+                       "polynomial%coefficient", "damper%coefficient", "model%loss_factor"]
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)
@@ -582,6 +627,23 @@ class Mode(TypedDict, total=False):
     synthesis: ArrayLike
 
 
+class Stress(TypedDict, total=False):
+    """Group &stress: stress and endurance of a cycle, of models with /stress."""
+
+    #: amplitude and mean by the largest von Mises stress between two instants, or of that stress
+    #: with the sign of its trace (default: 'range')
+    method: Literal["range", "signed"]
+    #: how amplitude and mean count together (default: 'goodman')
+    diagram: Literal["goodman", "gerber"]
+    #: [F/L^2] alternating stress that is endured (default: of the file, else no utilisation)
+    endurance: ArrayLike
+    #: [F/L^2] static strength (default: of the file, else no utilisation)
+    ultimate: ArrayLike
+    #: amplitude, mean and utilisation, or Fourier coefficients of the components too (default:
+    #: 'points')
+    output: Literal["points", "tensor"]
+
+
 class Output(TypedDict, total=False):
     """Group &output: result file, observed quantities."""
 
@@ -624,6 +686,7 @@ class Groups(TypedDict, total=False):
     contact: Contact
     spring: Spring
     polynomial: Polynomial
+    damper: Damper
     load: Load
     base: Base
     harmonics: Harmonics
@@ -634,5 +697,6 @@ class Groups(TypedDict, total=False):
     mission: Mission
     time: Time
     mode: Mode
+    stress: Stress
     output: Output
     control: Control

@@ -13,14 +13,14 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (89650, 1000),
-    "files of src": (407, 10),
-    "lines of the longest file": (777, 50),
+    "lines of src": (97400, 1000),
+    "files of src": (429, 10),
+    "lines of the longest file": (774, 50),
     "modules used by one file, at most": (32, 2),
     "files that name forces%pairs": (42, 0),
     "files that name case_type": (58, 0),
     "files that name an analysis": (5, 0),
-    "files with select type": (18, 0),
+    "files with select type": (19, 0),
 }
 
 
