@@ -55,7 +55,7 @@ def by_columns(key: str, value: object) -> object:
     """A namelist has arrays column by column, which shows in matrices of any shape."""
     if key.rpartition("%")[2].lower() not in _ANY_SHAPE or np.ndim(value) != 2:  # type: ignore[arg-type]
         return value
-    return np.transpose(value)  # type: ignore[arg-type]
+    return np.asarray(value).T
 
 
 def write_namelist(groups: Mapping[str, Mapping[str, object]]) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import h5py
 import numpy as np
@@ -75,7 +75,7 @@ class Polynomial(Elements):
         if self.of not in ("energy", "force"):
             raise InputError(f"polynomial.of: is {self.of!r}, must be 'energy' or 'force'")
         try:
-            rows = [list(row) for row in self.factors]  # type: ignore[union-attr]
+            rows = [list(row) for row in cast("Iterable[Iterable[int]]", self.factors)]
         except TypeError:
             raise InputError("polynomial.factors: must be a list of dofs for each term") from None
         if any(len(row) > MOST_FACTORS for row in rows):

@@ -50,8 +50,8 @@ module fw_point
       integer :: worst = 0
       !> Points whose signed stress jumps.
       integer :: n_jumps = 0
-      !> Fourier coefficients (0, c1, s1, ...) of xx, yy, zz, xy, yz, zx, point by point (2H+1, 6 n);
-      !> only when asked for.
+      !> Fourier coefficients (0, c1, s1, ...) of xx, yy, zz, xy, yz, zx, point by point
+      !> (2H+1, 6 n); only when asked for.
       real(wp), allocatable :: coefficients(:, :)
    end type point_stress
 

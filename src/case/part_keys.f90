@@ -1,6 +1,6 @@
 !> Keys of a group of elements as parts of a model: who declares keys in `bind_keys` has declared
-!> the datasets of a model file with them. The shape `8 x n_terms` of a key is `term 8` of a part, and
-!> the number of elements is that of the first array.
+!> the datasets of a model file with them. The shape `8 x n_terms` of a key is `term 8` of a part,
+!> and the number of elements is that of the first array.
 module fw_part_keys
    use fw_key, only: key_type, key_visitor
    use fw_kinds, only: wp

@@ -226,8 +226,8 @@ contains
                                   'dof), which group &stress needs')
       else if (allocated(options%endurance) .neqv. allocated(options%ultimate)) then
          call reader%refuse('stress', trim(merge('ultimate ', 'endurance', &
-                            allocated(options%endurance))), 'is missing: utilisation takes both '// &
-                            'endurance and ultimate, of the case or of the model file')
+                            allocated(options%endurance))), 'is missing: utilisation takes '// &
+                            'both endurance and ultimate, of the case or of the model file')
       end if
    end subroutine read_stress
 
