@@ -63,10 +63,11 @@ from .result import Result
 from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
 
-__all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError", "Damper",
-           "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
-           "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring", "Steps",
-           "__version__", "calibrate", "frf", "mode", "optimise", "resonance", "run", "wear"]
+__all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
+           "Damper", "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError",
+           "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring",
+           "Steps", "__version__", "calibrate", "frf", "mode", "optimise", "resonance", "run",
+           "wear"]
 
 
 def __getattr__(name: str) -> object:

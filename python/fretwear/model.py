@@ -225,7 +225,8 @@ class Model:
 
     def __init__(self, M: ArrayLike | None, C: ArrayLike | None, K: ArrayLike | None, *,
                  contact: ContactPairs | None = None, springs: Iterable[Spring] = (),
-                 elements: Iterable[Elements] = (), static: ArrayLike | None = None, cosine: ArrayLike | None = None,
+                 elements: Iterable[Elements] = (),
+                 static: ArrayLike | None = None, cosine: ArrayLike | None = None,
                  sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
                  static_rotation: ArrayLike | None = None, sectors: Sectors | None = None,
                  observe: Mapping[str, Observation] | None = None,

@@ -13,7 +13,8 @@ in a third; 1 to 15 harmonics, one frequency from half to 2.5 times the lowest o
 The judge takes the displacements and the forces of the result. The balance of every harmonic is
 written anew, and has to hold to 1e-7 of the load. Each joint is 2,000 Jenkins elements in parallel,
 marched over 8,192 instants of two periods from the assembly: coefficients within 2e-4 of the
-largest force, and the work. Where there are 5 harmonics or more in a third of the cases the structure with
+largest force, and the work. Where there are 5 harmonics or more in a third of the cases the
+structure with
 600 elements a joint is integrated for 25 periods from the solution on, by central differences: it
 stays there, but for what the harmonics leave (0.5/H**2 of the largest amplitude).
 """

@@ -83,7 +83,8 @@ def text(case):
     lines += [f"{key} = {row(case[key])}" for key in ("mass", "damping", "stiffness")]
     lines += ["/", "&contact", f"n_pairs = {len(pairs)}", f"law = {of('law')}",
               f"normal_law = {of('word')}",
-              "side_1 = " + ", ".join(f"{p['t']}, 0, {p['n']}" for p in pairs), f"gap = {of('gap')}"]
+              "side_1 = " + ", ".join(f"{p['t']}, 0, {p['n']}" for p in pairs),
+              f"gap = {of('gap')}"]
     if rubs:
         lines.append(f"mu = {of('mu')}")
         smooth = pairs[0]["law"] == "regularised"
@@ -98,7 +99,8 @@ def text(case):
         lines += [f"n_table = {len(d)}", f"overclosure = {row(d)}", f"force = {row(p)}"]
     lines += ["/", "&load"] + [f"{key} = {row(case[key])}" for key in ("cosine", "sine", "static")]
     lines += ["/", "&harmonics", f"n_harmonics = {case['harmonics']}", "n_time = 2048", "/",
-              "&sweep", f"start = {float(case['omega'])!r}", "/", "&solver", "tolerance = 1e-10", "/"]
+              "&sweep", f"start = {float(case['omega'])!r}", "/",
+              "&solver", "tolerance = 1e-10", "/"]
     return "\n".join(lines) + "\n"
 
 

@@ -77,7 +77,8 @@ def text(case, analysis):
     lines += [f"{key} = {row(case[key])}" for key in ("mass", "damping", "stiffness")]
     lines += ["/", "&contact", f"n_pairs = {len(pairs)}",
               f"law = '{'regularised' if case['rubs'] else 'penalty'}'",
-              "side_1 = " + ", ".join(f"{p['t']}, 0, {p['n']}" for p in pairs), f"gap = {of('gap')}"]
+              "side_1 = " + ", ".join(f"{p['t']}, 0, {p['n']}" for p in pairs),
+              f"gap = {of('gap')}"]
     if words:
         lines.append(f"normal_law = {of('word')}")
     if case["rubs"]:

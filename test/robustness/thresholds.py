@@ -170,6 +170,7 @@ def differ(one, other, names):
             if first is not second:
                 return True
             continue
+        first, second = (np.asarray(array, float) for array in (first, second))
         both = np.isfinite(first) & np.isfinite(second)
         size = np.abs(second[both]).max(initial=0.0)
         if (np.isfinite(first) != np.isfinite(second)).any() or (
