@@ -25,10 +25,12 @@ module fw_features
    !> Longest phrase.
    integer, parameter :: feature_length = 72
    character(*), parameter :: law_mark = 'a law '
-   !> What makes a structure the only sector of a cyclic one, and what has no time domain.
+   !> What makes a structure the only sector of a cyclic one, what has no time domain, and rows of
+   !> the model whose stress is found unless the case says no.
    character(*), parameter, public :: &
       matrices_alone = 'coriolis, structural damping, air or unsymmetric matrices', &
-      hysteretic = 'structural damping (loss_factor) or forces of the air'
+      hysteretic = 'structural damping (loss_factor) or forces of the air', &
+      stress = 'stress (group &stress, /stress of the model file)'
 
 contains
 
@@ -90,8 +92,6 @@ contains
          asked = a == analysis_resonance
       case ("case%analysis = 'time'")
          asked = a == analysis_time
-      case ("case%analysis = 'modes'")
-         asked = a == analysis_modes
       case ("resonance%parameter = 'model%rotation_speed'")
          asked = a == analysis_resonance .and. case%resonance%parameter == rotation_speed
       case ("case%analysis = 'wear'")
@@ -108,7 +108,7 @@ contains
          asked = all(a /= [analysis_frf, analysis_point, analysis_resonance, analysis_mode])
       case ('group &sensitivity')
          asked = case%sensitivity%is_wanted()
-      case ('group &stress')
+      case (stress)
          asked = case%stress%is_wanted()
       case ('group &control')
          asked = case%control%is_wanted()

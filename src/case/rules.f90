@@ -6,7 +6,8 @@
 module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_features, only: asks_for, feature_length, feature_text, hysteretic, matrices_alone
+   use fw_features, only: asks_for, feature_length, feature_text, hysteretic, matrices_alone, &
+      stress
    implicit none (type, external)
    private
 
@@ -179,7 +180,7 @@ module fw_rules
       rule_type('group &base', 'sweep%speed_order', 'give model%rotation_speed'), &
       rule_type('group &base', 'elements beside pairs and springs', &
                 'give the load that the base makes'), &
-      rule_type('group &base', 'group &stress', 'give the load that the base makes')]
+      rule_type('group &base', stress, "set stress%output = 'none'")]
 
    type(rule_type), parameter :: of_elements(*) = [ &
       rule_type('elements beside pairs and springs', "case%analysis = 'time'", &
@@ -207,12 +208,11 @@ module fw_rules
       rule_type('group &mission', "contact%memory = 'carried'", "use 'assembly'")]
 
    type(rule_type), parameter :: of_stress(*) = [ &
-      rule_type('group &stress', "harmonics%method = 'hdhb'", "use 'hbm'"), &
-      rule_type('group &stress', "case%analysis = 'time'", "use 'frf' or 'point'"), &
-      rule_type('group &stress', "case%analysis = 'modes'", &
-                "a mode has no size: use 'mode' or 'frf', or leave it out"), &
-      rule_type('group &stress', "resonance%parameter = 'model%rotation_speed'", &
-                'stress without motion changes with it: give single speeds')]
+      rule_type(stress, "harmonics%method = 'hdhb'", "use 'hbm', or stress%output = 'none'"), &
+      rule_type(stress, "case%analysis = 'time'", &
+                "use 'frf' or 'point', or stress%output = 'none'"), &
+      rule_type(stress, "resonance%parameter = 'model%rotation_speed'", &
+                "stress without motion changes with it: set stress%output = 'none'")]
 
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
                                              of_matrices, of_laws, of_base, of_elements, of_wear, &

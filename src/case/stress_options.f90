@@ -11,8 +11,8 @@ module fw_stress_options
 
    public :: stress_options
 
-   character(*), parameter :: output_words(*) = [character(6) :: 'points', 'tensor']
-   integer, parameter :: of_points = 1, of_tensor = 2
+   character(*), parameter :: output_words(*) = [character(6) :: 'points', 'tensor', 'none']
+   integer, parameter :: of_points = 1, of_tensor = 2, of_nothing = 3
 
    type :: stress_options
       integer :: n_points = 0
@@ -33,6 +33,7 @@ module fw_stress_options
       procedure :: is_wanted
       procedure :: writes_tensor
       procedure :: is_judged
+      procedure :: asks_for_rows
    end type stress_options
 
 contains
@@ -44,7 +45,8 @@ contains
       character(*), parameter :: of_model = 'of the file, else no utilisation'
 
       call keys%open('stress', 'stress and endurance of a cycle, of models with /stress')
-      call keys%set_size('n_stress', self%n_points)
+      ! Where there are no points one value is told to be of none.
+      call keys%set_size('n_stress', max(1, self%n_points))
       call keys%bind_word(key('method', 'amplitude and mean by the largest von Mises stress '// &
                               'between two instants, or of that stress with the sign of its '// &
                               'trace'), self%method, method_words)
@@ -54,8 +56,9 @@ contains
                          'F/L^2', 'n_stress', absent=of_model), self%endurance)
       call keys%bind(key('ultimate', 'static strength', above(0.0_wp), 'F/L^2', 'n_stress', &
                          absent=of_model), self%ultimate)
-      call keys%bind_word(key('output', 'amplitude, mean and utilisation, or Fourier '// &
-                              'coefficients of the components too'), self%output, output_words)
+      call keys%bind_word(key('output', 'amplitude, mean and utilisation, Fourier '// &
+                              'coefficients of the components too, or nothing'), &
+                          self%output, output_words)
    end subroutine bind_keys
 
    !> Take what the model says.
@@ -82,8 +85,17 @@ contains
    pure logical function is_wanted(self)
       class(stress_options), intent(in) :: self
 
-      is_wanted = self%n_points > 0
+      is_wanted = self%n_points > 0 .and. self%output /= of_nothing
    end function is_wanted
+
+   !> Whether something else than the defaults is given, which stand in every case that is written.
+   pure logical function asks_for_rows(self)
+      class(stress_options), intent(in) :: self
+
+      asks_for_rows = self%method /= by_range .or. self%diagram /= goodman .or. &
+                      self%output == of_tensor .or. allocated(self%endurance) .or. &
+                      allocated(self%ultimate)
+   end function asks_for_rows
 
    pure logical function writes_tensor(self)
       class(stress_options), intent(in) :: self

@@ -428,7 +428,7 @@ contains
       case%idle_spring = case%springs%n_springs == 0 .and. reader%has_group('spring') .and. &
                          .not. reader%given('spring', 'n_springs')
       call read_loads(reader, options, raw, terms)
-      if (reader%has_group('stress')) call case%stress%take(raw%stress, options%rotation_speed)
+      call case%stress%take(raw%stress, options%rotation_speed)
       call read_motion(reader, case%model%cyclic%is_cyclic, raw, case%contact, case%springs)
       wanted = case%sensitivity%parameters
       if (case%varied > 0) then

@@ -220,8 +220,9 @@ contains
       type(stress_options), intent(inout) :: options
 
       call options%bind_keys(reader)
-      if (reader%failed() .or. .not. reader%has_group('stress')) return
+      if (reader%failed()) return
       if (options%n_points == 0) then
+         if (.not. options%asks_for_rows()) return
          call reader%refuse_model('no stress/matrix (six components at each point, for each '// &
                                   'dof), which group &stress needs')
       else if (allocated(options%endurance) .neqv. allocated(options%ultimate)) then

@@ -150,7 +150,7 @@ def test_nothing_else_changes(tmp_path):
         for stress in (True, False):
             groups = with_model(case) | way
             if not stress:
-                del groups["stress"]
+                groups["stress"] = {"output": "none"}
             run(tmp_path, groups)
             with h5py.File(tmp_path / "case.h5") as done:
                 results.append(done["coefficients"][()])
@@ -176,9 +176,17 @@ def test_wrong_models_are_refused(tmp_path, change, words):
     assert words in done.stderr
 
 
+def test_natural_frequencies_have_none(tmp_path):
+    datasets, case = structure(1, 2, 1)
+    write_model(tmp_path / "model.h5", datasets)
+    del case["stress"]
+    run(tmp_path, with_model(case | {"case": {"analysis": "modes"}}))
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert "modes" in file and "stress" not in file
+
+
 @pytest.mark.parametrize(("groups", "words"), [
     ({"case": {"analysis": "time"}}, "use 'frf' or 'point'"),
-    ({"case": {"analysis": "modes"}}, "a mode has no size"),
     ({"harmonics": {"n_harmonics": 3, "method": "hdhb"}}, "use 'hbm'"),
     ({"stress": {"endurance": 0.0}}, "must be a finite real above 0"),
     ({"stress": {"endurance": [1.0, 2.0, 3.0]}}, "must be 2, or one"),
