@@ -62,12 +62,13 @@ from .model import ContactPairs, Model, Spring
 from .result import Result
 from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
+from .stress import Stress
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "Damper", "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError",
            "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring",
-           "Steps", "__version__", "calibrate", "frf", "mode", "optimise", "resonance", "run",
-           "wear"]
+           "Steps", "Stress", "__version__", "calibrate", "frf", "mode", "optimise", "resonance",
+           "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

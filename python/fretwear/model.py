@@ -19,6 +19,7 @@ from .elements import Elements, checked_elements, read_elements
 from .errors import InputError, NotBuiltError, OutputError
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
+from .stress import OF_PICTURES, Stress, read_stress
 
 __all__ = ["ContactPairs", "Model", "Spring"]
 
@@ -207,6 +208,8 @@ class Model:
         In their place the motion of all dofs with the ground.
     load_table : (n_table, 2), optional
         Frequencies [rad/s], and what multiplies all vibratory loads there.
+    stress : Stress, optional
+        Rows that give the stress at points, and what these endure.
     sectors : Sectors, optional
         Makes the model one of equal sectors around an axis. With matrices of nodal diameters M, C
         and K are None.
@@ -237,7 +240,7 @@ class Model:
                  stiffness_unsymmetric: ArrayLike | None = None,
                  damping_unsymmetric: ArrayLike | None = None,
                  base_dof: ArrayLike | None = None, base_direction: ArrayLike | None = None,
-                 load_table: ArrayLike | None = None,
+                 load_table: ArrayLike | None = None, stress: Stress | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
@@ -282,6 +285,9 @@ class Model:
             array(f"springs[{number}].coefficient", spring.coefficient, ())
         self.elements = checked_elements(elements, n)
         self.sectors = None if sectors is None else sectors.checked(n)
+        if stress is not None and not isinstance(stress, Stress):
+            raise InputError(f"stress: is a {type(stress).__name__}, must be Stress")
+        self.stress = None if stress is None else stress.checked(n)
         self._observe = None if observe is None else _rows(observe, n)
         if observe is not None and self._diameter_names() is not None:
             raise InputError("observe: is given beside rows of nodal diameters, must be one of "
@@ -444,7 +450,7 @@ class Model:
                     stiffness_rotation=found.get("stiffness_rotation"),
                     **{name: found.get(name) for name in _MATRICES},
                     base_dof=found.get("base/dof"), base_direction=found.get("base/direction"),
-                    load_table=found.get("load/table"),
+                    load_table=found.get("load/table"), stress=read_stress(file),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -515,6 +521,8 @@ class Model:
             found.update(one.datasets())
         if self.sectors is not None:
             found.update(self.sectors.datasets())
+        if self.stress is not None:
+            found.update(self.stress.datasets())
         if self._observe is not None:
             found["observe/name"] = strings(self._observe[0])
             found["observe/matrix"] = self._observe[1]
@@ -533,6 +541,8 @@ class Model:
         if self.sectors is not None:
             session.put("cyclic/n_sectors", np.array([self.sectors.n_sectors], dtype=np.int32))
         for name, values in self._datasets().items():
+            if name.removeprefix("stress/") in OF_PICTURES:
+                continue
             if not name.startswith("observe/") and values.dtype.kind in "if":
                 session.put(name, values)
         for one in self.elements:

@@ -34,6 +34,7 @@ module fw_stress_options
       procedure :: writes_tensor
       procedure :: is_judged
       procedure :: asks_for_rows
+      procedure :: fits
    end type stress_options
 
 contains
@@ -96,6 +97,18 @@ contains
                       self%output == of_tensor .or. allocated(self%endurance) .or. &
                       allocated(self%ultimate)
    end function asks_for_rows
+
+   !> Whether everything is of as many points.
+   pure logical function fits(self)
+      class(stress_options), intent(in) :: self
+
+      fits = .true.
+      if (allocated(self%static)) fits = size(self%static, 2) == self%n_points
+      if (allocated(self%static_rotation)) fits = fits .and. size(self%static_rotation, 2) == &
+                                                  self%n_points
+      if (allocated(self%endurance)) fits = fits .and. size(self%endurance) == self%n_points
+      if (allocated(self%ultimate)) fits = fits .and. size(self%ultimate) == self%n_points
+   end function fits
 
    pure logical function writes_tensor(self)
       class(stress_options), intent(in) :: self

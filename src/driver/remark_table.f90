@@ -59,6 +59,9 @@ module fw_remark_table
                   'with contact or nonlinear springs takes accuracy = 1e-2, where nothing '// &
                   'else given forbids it (n_time, histories, a method other than hbm, '// &
                   'memory = ''carried''); steps of a session keep one harmonic'), &
+      remark_kind('unstable', &
+                  'coriolis, circulatory, unsymmetric or air forces: the linear structure '// &
+                  'without contact has a mode that grows'), &
       remark_kind('one harmonic', &
                   'contact or springs, and n_harmonics = 1'), &
       remark_kind('too few harmonics', &

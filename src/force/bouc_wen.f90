@@ -51,8 +51,8 @@ contains
 
       associate (unused => self, unused_closes => closes, constants => contact%constants)
          call constants%bind(keys, tangential_stiffness_key(), slides)
-         call constants%bind(keys, key('bouc_wen_exponent', 'n of |z|**n, 1 or 2: how sharply '// &
-            'the force turns to its limit', at_least(1.0_wp) .and. at_most(2.0_wp), '', &
+         call constants%bind(keys, key('bouc_wen_exponent', 'n of abs(z)**n, 1 or 2: how '// &
+            'sharply the force turns to its limit', at_least(1.0_wp) .and. at_most(2.0_wp), '', &
             'n_pairs', absent='1'), .false.)
          call constants%bind(keys, key('bouc_wen_beta', 'shape of the loops: 0.5 unloads with '// &
             'the tangential stiffness, 1 with twice of it from the limit', &

@@ -94,8 +94,8 @@ contains
       call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1', &
                          shape='n_dampers', absent=of_file, only='&cyclic'), self%sector_2, &
                      default=0)
-      call keys%bind(key('coefficient', 'c of the force c u**position_power |v|**(power - 1) '// &
-                         'v, v = du/dt', shape='n_dampers', absent=or_needed), &
+      call keys%bind(key('coefficient', 'c of the force c u**position_power '// &
+                         'abs(v)**(power - 1) v, v = du/dt', shape='n_dampers', absent=or_needed), &
                      self%coefficient, self%n_given > 0 .and. .not. allocated(self%coefficient))
       call keys%bind(key('power', 'of the velocity: 1 viscous, 2 drag', &
                          at_least(1.0_wp) .and. at_most(real(most_power, wp)), &

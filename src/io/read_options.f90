@@ -225,6 +225,10 @@ contains
          if (.not. options%asks_for_rows()) return
          call reader%refuse_model('no stress/matrix (six components at each point, for each '// &
                                   'dof), which group &stress needs')
+      else if (.not. options%fits()) then
+         call reader%refuse_model('stress/static, static_rotation, endurance or ultimate of '// &
+                                  'another number of points than stress/matrix: must be '// &
+                                  to_text(options%n_points))
       else if (allocated(options%endurance) .neqv. allocated(options%ultimate)) then
          call reader%refuse('stress', trim(merge('ultimate ', 'endurance', &
                             allocated(options%endurance))), 'is missing: utilisation takes '// &

@@ -408,15 +408,6 @@ def test_a_nodal_diameter_that_is_missing(tmp_path):
     assert "harmonic 2" in message and "/aero/nodal_diameter/-3" in message
 
 
-def test_without_sectors(tmp_path):
-    write_sector(tmp_path / "model.h5", whirling(6, air=None))
-    with h5py.File(tmp_path / "model.h5", "a") as file:
-        del file["cyclic"]
-    done = run(tmp_path, {"model": {"source": "hdf5", "file": "model.h5"},
-                          "sweep": {"values": OMEGAS}}, status=3)
-    assert "&cyclic" in done.stderr and "n_sectors = 1" in done.stderr
-
-
 def test_model_in_memory(tmp_path):
     """The Coriolis matrix of a Model, whose order of rows matters, and its file."""
     case = whirling(5, air=None) | {"contact": {}}

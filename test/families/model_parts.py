@@ -298,6 +298,9 @@ def judge(found, told, refused, text, remark):
     near = [name for name in both if distance(tidy(word), tidy(name)) == least]
     named = re.search(r"did you mean (?:attribute )?/?([\w/]+)", text)
     last = named[1].split("/")[-1] if named else ""
+    if word in both and "has shape" in text:
+        # An attribute as a dataset, where a dataset of that name is a part too: its shape is told.
+        last = word
     found["named" if last in near else "unnamed"] = 1
 
 

@@ -38,7 +38,7 @@ def solve(folder, matrices, load, keys=None, omega=(1.0,), n_harmonics=3, **grou
     case = {"case": {"analysis": "frf"},
             "model": {"source": "hdf5", "file": "model.h5", **(keys or {})},
             "harmonics": {"n_harmonics": n_harmonics, "parity": "all"},
-            "sweep": {"frequencies": list(omega)}, "solver": {"tolerance": TOLERANCE}}
+            "sweep": {"values": list(omega)}, "solver": {"tolerance": TOLERANCE}}
     for name, more in groups.items():
         case.setdefault(name, {}).update(more)
     found = run_case(folder, case)
@@ -398,7 +398,7 @@ def test_sweeps_and_derivatives_by_the_loss_factor(tmp_path):
     swept = run_case(tmp_path, case)
     for eta, row in zip(values, swept.coefficients, strict=True):
         assert row == pytest.approx(at(eta), abs=WITHIN * np.abs(row).max())
-    case["sweep"] = {"frequencies": [0.9]}
+    case["sweep"] = {"values": [0.9]}
     case["sensitivity"] = {"parameters": "model%loss_factor", "quantities": "first_harmonic"}
     run(tmp_path, case)
     with h5py.File(tmp_path / "case.h5") as file:
@@ -539,14 +539,14 @@ def test_wear_with_hysteretic_damping(tmp_path):
      ["speed_order", "modal_damping"]),
     ({"stiffness_rotation": np.eye(2)}, {}, {
         "sweep": {"speed_order": 1.0, "parameter": "load%harmonic_scale", "values": [1.0],
-                  "frequency": 1.0, "frequencies": None}}, ["speed_order", "parameter"]),
+                  "frequency": 1.0, "values": None}}, ["speed_order", "parameter"]),
     ({}, {}, {"sweep": {"speed_order": -1.0}}, ["speed_order", "at least 0"])])
 def test_what_is_refused(tmp_path, more, keys, groups, words):
     parts = {"mass": np.eye(2), "stiffness": np.eye(2), "damping": 0.1 * np.eye(2)}
     write_model(tmp_path / "model.h5", parts | more, {"load/cosine": [0.1, 0.0]})
     case = {"case": {"analysis": "frf"},
             "model": {"source": "hdf5", "file": "model.h5", **keys},
-            "harmonics": {"n_harmonics": 1}, "sweep": {"frequencies": [1.0]}}
+            "harmonics": {"n_harmonics": 1}, "sweep": {"values": [1.0]}}
     for name, values in groups.items():
         case.setdefault(name, {}).update(values)
         case[name] = {key: value for key, value in case[name].items() if value is not None}
