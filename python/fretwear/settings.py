@@ -286,7 +286,7 @@ class Contact(TypedDict, total=False):
     #: stiffness that is lost at once where the last elements slip, over that lost before; only: law
     #: = 'iwan' (default: 0)
     iwan_beta: ArrayLike
-    #: n of |z|**n, 1 or 2: how sharply the force turns to its limit; only: law = 'bouc_wen'
+    #: n of abs(z)**n, 1 or 2: how sharply the force turns to its limit; only: law = 'bouc_wen'
     #: (default: 1)
     bouc_wen_exponent: ArrayLike
     #: shape of the loops: 0.5 unloads with the tangential stiffness, 1 with twice of it from the
@@ -354,8 +354,8 @@ class Damper(TypedDict, total=False):
     side_2: ArrayLike
     #: sector of side 2, counted from that of side 1; only: &cyclic (default: of the file, else 0)
     sector_2: ArrayLike
-    #: c of the force c u**position_power |v|**(power - 1) v, v = du/dt (default: of the file, else
-    #: required)
+    #: c of the force c u**position_power abs(v)**(power - 1) v, v = du/dt (default: of the file,
+    #: else required)
     coefficient: ArrayLike
     #: of the velocity: 1 viscous, 2 drag (default: of the file, else 1)
     power: ArrayLike
@@ -639,9 +639,9 @@ class Stress(TypedDict, total=False):
     endurance: ArrayLike
     #: [F/L^2] static strength (default: of the file, else no utilisation)
     ultimate: ArrayLike
-    #: amplitude, mean and utilisation, or Fourier coefficients of the components too (default:
-    #: 'points')
-    output: Literal["points", "tensor"]
+    #: amplitude, mean and utilisation, Fourier coefficients of the components too, or nothing
+    #: (default: 'points')
+    output: Literal["points", "tensor", "none"]
 
 
 class Output(TypedDict, total=False):

@@ -143,8 +143,8 @@ def test_a_wrong_key_is_answered_with_the_right_one() -> None:
     unknown: Any = {"continuation": "arclength"}
     with pytest.raises(fw.InputError, match=r"continuation: is a key: .*sweep=\{.continuation"):
         fw.frf(RUBBING, 1, 2, 3, **unknown)
-    with pytest.raises(fw.InputError, match=r"harmonix: is no group .*did you mean harmonics\?"):
-        fw.frf(RUBBING, 1, 2, 3, **dict[str, Any](harmonix=3))
+    with pytest.raises(fw.InputError, match=r"harmonicss: is no group .*did you mean harmonics\?"):
+        fw.frf(RUBBING, 1, 2, 3, **dict[str, Any](harmonicss=3))
     with pytest.raises(fw.InputError, match=r"no group &swep.*did you mean sweep\?"):
         fw.Case(RUBBING, **dict[str, Any](swep={"start": 1.0})).check()
     with pytest.raises(fw.InputError, match=r"no derivatives by it.*did you mean contact%mu\?"):

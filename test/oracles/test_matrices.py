@@ -539,7 +539,7 @@ def test_wear_with_hysteretic_damping(tmp_path):
      ["speed_order", "modal_damping"]),
     ({"stiffness_rotation": np.eye(2)}, {}, {
         "sweep": {"speed_order": 1.0, "parameter": "load%harmonic_scale", "values": [1.0],
-                  "frequency": 1.0, "values": None}}, ["speed_order", "parameter"]),
+                  "frequency": 1.0}}, ["speed_order", "parameter"]),
     ({}, {}, {"sweep": {"speed_order": -1.0}}, ["speed_order", "at least 0"])])
 def test_what_is_refused(tmp_path, more, keys, groups, words):
     parts = {"mass": np.eye(2), "stiffness": np.eye(2), "damping": 0.1 * np.eye(2)}
