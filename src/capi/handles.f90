@@ -17,7 +17,7 @@ module fw_handles
       integer :: id = 0
       !> A call that may change the session is under way.
       logical :: busy = .false.
-      type(session_type) :: session
+      class(session_type), allocatable :: session
       type(callback_observer) :: observer
       !> What the last call that failed had to say.
       character(:), allocatable :: message
@@ -45,6 +45,7 @@ contains
       status = status_failure
       allocate (handle, stat=problem)
       if (problem /= 0) return
+      allocate (handle%session)
       handle%message = ''
       !$omp critical (fretwear_handles)
       ! Numbers are never given twice, so that they may run out.

@@ -72,7 +72,7 @@ module fw_accuracy
       !> How far the tail of the last solution moved it, where that was looked for.
       real(wp), private :: change = unknown
       !> The case with the law that is solved; whether a pair has two tangential directions.
-      type(case_type), private :: case
+      class(case_type), allocatable, private :: case
       logical, private :: planar = .false.
       !> What may end the work on the present point.
       class(interrupt_type), pointer, private :: interrupt => null()
@@ -101,7 +101,8 @@ contains
       allocate (self%by_instants(size(self%n_harmonics), fewest:limits%most_doublings), &
                 source=unknown/limits%safety)
       if (case%contact%n_pairs > 0) self%factor_time = limits%factor_instants
-      self%case = case
+      if (allocated(self%case)) deallocate (self%case)
+      allocate (self%case, source=case)
       self%case%contact%law = law_under_accuracy(case%contact, &
                                                  case%harmonics%sampling == sampling_uniform)
       call need(self, self%current, self%doublings, error)

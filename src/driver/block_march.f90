@@ -51,8 +51,8 @@ module fw_block_march
 
    !> Not to be moved once it is built.
    type :: block_type
-      type(case_type) :: case
-      type(wear_joint) :: joint
+      class(case_type), allocatable :: case
+      class(wear_joint), allocatable :: joint
       type(block_recorder) :: recorder
       !> It has a vibration.
       logical :: is_known = .false.
@@ -80,6 +80,7 @@ contains
       type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
 
+      allocate (self%case, self%joint)
       call read_block(case, number, self%case, error)
       if (allocated(error)) return
       call self%joint%build(self%case, error, held=self%recorder%finer%held)

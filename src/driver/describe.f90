@@ -25,7 +25,7 @@ module fw_describe
       type(stability_solver) :: stability
       !> Derivatives take the equations that were solved: whoever has these finds them.
       type(sensitivity_solver) :: sensitivity
-      type(stress_recovery), private :: stress
+      class(stress_recovery), allocatable, private :: stress
       integer(int64), private :: clock = 0
    contains
       procedure :: start_clock
@@ -79,6 +79,7 @@ contains
          if (request%cycle) call recover_cycle(system, n_coordinates, x, point)
       end associate
       if (case%stress%is_wanted()) then
+         if (.not. allocated(self%stress)) allocate (self%stress)
          call self%stress%find(case, system, x, n_harmonics, point, error)
          if (allocated(error)) return
       end if

@@ -37,7 +37,7 @@ module fw_known_tail
    type :: known_tail
       !> The balance of N harmonics, evaluated and never solved; its unknowns.
       type(balance_problem), allocatable, private :: problem
-      type(balance_state), private :: finer
+      class(balance_state), allocatable, private :: finer
       real(wp), allocatable, private :: x(:), r(:)
       !> Unknowns of the balance of H harmonics, as they are corrected.
       real(wp), allocatable, private :: coarse(:)
@@ -122,7 +122,7 @@ contains
       self%is_built = .true.
       if (self%n_total <= n) return
       finer%n_harmonics = self%n_total
-      allocate (self%problem)
+      allocate (self%problem, self%finer)
       ! With the same laws: E is chosen by H, and with another one a solution would not be one.
       call build_system(case, self%problem, self%finer, error, of_level=finer, &
                         forces=system%problem%forces, held=held)

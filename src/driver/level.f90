@@ -31,7 +31,7 @@ module fw_level
       type(balance_problem) :: problem
       !> Of the problem: levels are not copied once they are built.
       type(balance_state) :: system
-      type(point_solver) :: solver
+      class(point_solver), allocatable :: solver
       !> Where on the path was solved last, if anywhere, and the observed coefficients there.
       logical :: is_solved = .false.
       real(wp) :: place = 0.0_wp
@@ -91,6 +91,7 @@ contains
       end do
       call summary%describe_work(levels(largest)%system, work, kind, all_converged)
       do k = 1, n
+         if (.not. levels(k)%is_built) cycle
          if (.not. levels(k)%solver%method%undetermined%omega > 0.0_wp) cycle
          call remark_undetermined(levels(k)%solver%method%undetermined, summary%remarks)
          exit
@@ -113,6 +114,7 @@ contains
       if (present(doublings)) self%harmonics%doublings = doublings
       call build_system(case, self%problem, self%system, error, of_level=self%harmonics, held=held)
       if (allocated(error)) return
+      allocate (self%solver)
       call self%solver%start(case, self%harmonics, self%system%n)
       self%is_built = .true.
    end subroutine build
@@ -122,7 +124,8 @@ contains
       class(level_type), intent(inout) :: self
       type(case_type), intent(in) :: case
 
-      self%solver = point_solver()
+      deallocate (self%solver)
+      allocate (self%solver)
       call self%solver%start(case, self%harmonics, self%system%n)
       self%is_solved = .false.
    end subroutine renew

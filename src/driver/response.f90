@@ -43,8 +43,8 @@ module fw_response
       type(case_type), pointer :: case => null()
       !> What it is built of, where it is asked for point by point, and all unknowns: those of the
       !> balance, and further ones of a vibration that has them.
-      type(balance_problem), allocatable :: problem
-      type(balance_state), allocatable :: state
+      class(balance_problem), allocatable :: problem
+      class(balance_state), allocatable :: state
       integer :: n = 0
       type(powell_solver) :: powell
       type(kinsol_solver) :: kinsol
@@ -53,8 +53,8 @@ module fw_response
       !> Of the system that is solved.
       type(harmonics_options) :: harmonics
       !> The balance with nothing condensed, made when a flow is first needed.
-      type(balance_problem), allocatable :: whole_problem
-      type(balance_state), allocatable :: whole
+      class(balance_problem), allocatable :: whole_problem
+      class(balance_state), allocatable :: whole
       !> A solution was refused because it grows without bound.
       logical :: unbounded = .false.
       !> Motions that nothing determines, as springs and stuck pairs hold them, and what was taken

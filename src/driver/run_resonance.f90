@@ -28,7 +28,7 @@ module fw_run_resonance
    type, extends(analysis) :: resonance_analysis
       private
       type(run_type), pointer :: run => null()
-      type(resonance_track) :: track
+      class(resonance_track), allocatable :: track
       type(walk_type) :: walk
       type(resonance_table) :: table
       !> Along a branch alone.
@@ -53,6 +53,7 @@ contains
       type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
 
+      allocate (self%track)
       call self%track%start(case, error)
       if (allocated(error)) return
       self%run => run

@@ -48,11 +48,11 @@ module fw_session
       !> Namelist text, its path or name, and `group%key=value` on top of it.
       character(:), allocatable, private :: text, path
       type(string_type), allocatable, private :: keys(:)
-      type(memory_model_type), allocatable, private :: model
+      class(memory_model_type), allocatable, private :: model
       !> The case agrees with what was given.
       logical, private :: is_read = .false.
       !> Only between `start` and the next change.
-      type(one_level), allocatable, private :: strategy
+      class(one_level), allocatable, private :: strategy
       !> Only between pieces of one sweep.
       type(kept_strategy), private :: kept
    contains

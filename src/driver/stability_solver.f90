@@ -37,7 +37,7 @@ module fw_stability_solver
       !> The balance with twice the harmonics, made when it is first needed; the state points at the
       !> problem, which stays where it is.
       type(balance_problem), allocatable, private :: problem
-      type(balance_state), allocatable, private :: fine
+      class(balance_state), allocatable, private :: fine
       type(newton_solver), private :: newton
    contains
       procedure :: find

@@ -27,7 +27,7 @@ module fw_stress_recovery
       private
       logical :: is_built = .false.
       !> The case with the rows as its observed quantities.
-      type(case_type), allocatable :: case
+      class(case_type), allocatable :: case
       type(balance_problem), allocatable :: problem
       type(balance_state), allocatable :: system
       type(stress_grid) :: grid

@@ -35,10 +35,10 @@ module fw_time_response
 
    type, extends(point_strategy) :: time_strategy
       !> The case of which the harmonic balance gives the initial states, and its system.
-      type(case_type) :: start_case
+      class(case_type), allocatable :: start_case
       type(balance_problem) :: problem
       type(balance_state) :: system
-      type(point_solver) :: solver
+      class(point_solver), allocatable :: solver
       !> What is integrated.
       type(time_structure) :: structure
    contains
@@ -57,7 +57,8 @@ contains
 
       call check_steps(case, error)
       if (allocated(error)) return
-      self%start_case = case_of_start(case)
+      allocate (self%solver)
+      call case_of_start(case, self%start_case)
       call build_system(self%start_case, self%problem, self%system, error)
       if (allocated(error)) return
       call self%solver%start(self%start_case, self%start_case%harmonics, self%system%n)
@@ -97,13 +98,13 @@ contains
 
    !> The case of which the harmonic balance solution gives the initial state: all dofs are
    !> observed.
-   function case_of_start(case) result(start)
+   subroutine case_of_start(case, start)
       type(case_type), intent(in) :: case
-      type(case_type) :: start
+      class(case_type), allocatable, intent(out) :: start
       integer :: i
 
       ! One solution serves: contact results and histories are those of the integration.
-      start = case
+      allocate (start, source=case)
       start%analysis = analysis_frf
       start%harmonics%method = method_hbm
       start%output%contact = .false.
@@ -114,7 +115,7 @@ contains
       do i = 1, case%model%n_dof
          start%model%observe_matrix(i, i) = 1.0_wp
       end do
-   end function case_of_start
+   end subroutine case_of_start
 
    !> Initial state, integration, time spent.
    subroutine solve(self, case, request, point, error)

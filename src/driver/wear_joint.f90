@@ -35,7 +35,7 @@ module fw_wear_joint
       type(balance_problem) :: problem
       type(balance_state) :: balance
       type(wear_system) :: system
-      type(point_solver) :: solver
+      class(point_solver), allocatable :: solver
       type(wear_march) :: march
       !> Where it stands.
       type(wear_state) :: state
@@ -61,6 +61,7 @@ contains
 
       call build_system(case, self%problem, self%balance, error, held=held)
       if (allocated(error)) return
+      allocate (self%solver)
       call self%solver%start(case, case%harmonics, self%balance%n)
    end subroutine build
 

@@ -41,7 +41,7 @@ module fw_wear_response
 
    type, extends(analysis) :: wear_analysis
       private
-      type(wear_joint) :: joint
+      class(wear_joint), allocatable :: joint
       type(wear_recorder) :: recorder
       !> Where the run started.
       type(wear_state) :: first
@@ -60,6 +60,7 @@ contains
       type(run_type), intent(inout), target :: run
       type(error_type), allocatable, intent(out) :: error
 
+      allocate (self%joint)
       call self%joint%build(case, error, held=self%recorder%finer%held)
       if (.not. allocated(error)) call start_recorder(self%recorder, case, run, error)
       if (allocated(error)) return
