@@ -92,6 +92,7 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
                   "circulatory", "stiffness_unsymmetric", "damping_unsymmetric", any
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
+                  "contact/gap_rotation", "contact/normal_load_rotation",
                   "contact/tangential_stiffness", "contact/normal_stiffness",
                   "contact/normal_coefficient", "contact/normal_exponent",
                   "contact/reference_force", "contact/decay_length", "contact/slip_speed",

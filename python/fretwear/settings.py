@@ -12,8 +12,8 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["UNITS", "Base", "CaseGroup", "Contact", "Control", "Cyclic", "Damper", "Groups",
-           "Harmonics", "Load", "Mission", "Mode", "Output", "Polynomial", "PseudoTime",
+__all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic", "Damper",
+           "Groups", "Harmonics", "Load", "Mission", "Mode", "Output", "Polynomial", "PseudoTime",
            "Resonance", "Sensitivity", "Solver", "Spring", "Stress", "Structure", "Sweep", "Time",
            "Wear"]
 
@@ -36,6 +36,8 @@ UNITS: dict[str, str] = {
     "contact%gap": "L",
     "contact%area": "L^2",
     "contact%normal_load": "F",
+    "contact%gap_rotation": "L s^2",
+    "contact%normal_load_rotation": "F s^2",
     "contact%tangential_stiffness": "F/L",
     "contact%normal_stiffness": "F/L",
     "contact%normal_coefficient": "F/L^e",
@@ -65,6 +67,8 @@ UNITS: dict[str, str] = {
     "mode%amplitudes": "L",
     "mode%start": "L",
     "mode%end": "L",
+    "campbell%start": "rad/s",
+    "campbell%end": "rad/s",
     "stress%endurance": "F/L^2",
     "stress%ultimate": "F/L^2",
     "control%amplitude": "L",
@@ -77,8 +81,8 @@ class CaseGroup(TypedDict, total=False):
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
     #: a sweep, one frequency, wear at one frequency, integration in time, natural frequencies, a
-    #: nonlinear mode, or a resonance over a parameter (default: 'frf')
-    analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance"]
+    #: nonlinear mode, a resonance over a parameter, or frequencies over the (default: 'frf')
+    analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
@@ -244,6 +248,12 @@ class Contact(TypedDict, total=False):
     #: [F] constant compressive force; only: pairs without a normal dof (default: of the file, else
     #: required with friction)
     normal_load: ArrayLike
+    #: [L s^2] added to gap, for each (rad/s)^2 of the rotation speed; only: rotation_speed,
+    #: speed_order, campbell (default: of the file, else none)
+    gap_rotation: ArrayLike
+    #: [F s^2] added to normal_load, for each (rad/s)^2 of the rotation speed; only: rotation_speed,
+    #: speed_order, campbell (default: of the file, else none)
+    normal_load_rotation: ArrayLike
     #: [F/L] contact stiffness; 0 with a parallel pair that has one, or without a tangential dof;
     #: only: law = 'penalty', 'iwan', 'bouc_wen' (default: of the file, else required with
     #: tangential dofs)
@@ -627,6 +637,26 @@ class Mode(TypedDict, total=False):
     synthesis: ArrayLike
 
 
+class Campbell(TypedDict, total=False):
+    """Group &campbell: frequencies over the rotation speed, and where engine orders meet them."""
+
+    #: [rad/s] lowest rotation speed; only: analysis = 'campbell' (required)
+    start: float
+    #: [rad/s] highest rotation speed; only: analysis = 'campbell' (required)
+    end: float
+    #: speeds, from start to end (default: 15)
+    n_speeds: int
+    #: engine orders, with the sign of cyclic%engine_order; none is 0; only: analysis = 'campbell'
+    #: (required)
+    orders: ArrayLike
+    #: factor of the vibratory load, of all orders or of each (default: 1)
+    order_scale: ArrayLike
+    #: look for the maximum near each crossing, with friction (default: .true.)
+    peaks: bool
+    #: frequencies across each of them (default: 41)
+    n_points: int
+
+
 class Stress(TypedDict, total=False):
     """Group &stress: stress and endurance of a cycle, of models with /stress."""
 
@@ -697,6 +727,7 @@ class Groups(TypedDict, total=False):
     mission: Mission
     time: Time
     mode: Mode
+    campbell: Campbell
     stress: Stress
     output: Output
     control: Control

@@ -173,6 +173,6 @@ def test_command_line(modes: Result, wave: Result, folder: Path, monkeypatch: py
     assert main(["plot", *paths, "--kind", "safe"]) == 3
     assert "response, backbone, campbell, damping" in capsys.readouterr().err
     assert main(["plot", paths[0], "--kind", "campbell"]) == 3
-    assert "name two or more, at several speeds" in capsys.readouterr().err
+    assert "case%analysis = 'campbell'" in capsys.readouterr().err
     assert main(["plot", *paths, "--kind", "campbell", "--observe", "tip"]) == 3
     assert main(["plot", paths[0], "--nodal-diameter", "4"]) == 3

@@ -72,12 +72,13 @@ contains
                call add_outputs(self, entry, work, not_open(p, work, .false.), &
                                 self%problem%incidence%identity, m, dr)
             end if
+            if (in_time .and. p%grows()) call add_law_by_frequency(self, entry, work, m, nc, dr)
             if (.not. p%takes_balance) cycle
             call inputs_by_point(self, entry, in_time, m, nc, q, dr, work%input)
             call multiply_derivative(entry%row, work)
             call add_outputs(self, entry, work, not_open(p, work, .true.), &
                              self%problem%incidence%identity, m, dr)
-            if (p%has_inertia .and. in_time) then
+            if (p%has_inertia .and. in_time .and. .not. p%grows()) then
                call add_law_by_frequency(self, entry, work, m, nc, dr)
             end if
          end associate
@@ -97,8 +98,8 @@ contains
                       [(prediction%takes(i) .eqv. takes, i=1, size(work%linear_state))])
    end function not_open
 
-   !> A law with inertia in units of time depends on the frequency by itself: a central difference,
-   !> its inputs being held.
+   !> A law with inertia in units of time depends on the frequency by itself, and one whose gaps
+   !> grow with a speed that follows it: a central difference, its inputs being held.
    subroutine add_law_by_frequency(self, entry, work, m, nc, dr)
       type(balance_state), intent(inout) :: self
       type(force_entry), intent(in) :: entry
@@ -114,11 +115,13 @@ contains
       ! (f(omega + step) - f(omega - step))/(2 step).
       do side = -1, 1, 2
          work%rate = self%frequency() + side*step
+         if (entry%law%prediction%grows()) call entry%law%set_offset(self%depth, work)
          call entry%law%evaluate(self%problem%fourier, work)
          call self%problem%incidence%scatter(entry%rows, m, nc, 0.5_wp*side/step, work%force, dr)
       end do
       ! And back: what an evaluation leaves in `work` belongs to the present frequency.
       work%rate = self%frequency()
+      if (entry%law%prediction%grows()) call entry%law%set_offset(self%depth, work)
       call entry%law%evaluate(self%problem%fourier, work)
    end subroutine add_law_by_frequency
 

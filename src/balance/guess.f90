@@ -83,7 +83,7 @@ contains
       real(wp), intent(out) :: tension(:)
       type(rest_type), intent(inout) :: rest
       real(wp) :: opening(size(closed)), before(size(closed)), change
-      integer :: m, step
+      integer :: i, m, step
 
       m = system%problem%structure%n_coordinates
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
@@ -98,7 +98,10 @@ contains
             call linear_solution(system, closed, .true., rest, x, tension)
             call system%problem%incidence%gather(system%problem%joint%row(3, :), m, 1, x(:m), &
                                                  opening)
-            rest%y = law%prediction%stiffness(:, 3)*(opening + law%prediction%gap + system%depth)
+            do i = 1, size(opening)
+               rest%y(i) = law%prediction%stiffness(i, 3)*(opening(i) + &
+                           law%prediction%gap_at(i, system%frequency()) + system%depth(i))
+            end do
             change = maxval(abs(rest%y - before), mask=closed)
             if (change <= rest_tolerance*maxval(abs(rest%y), mask=closed)) exit
          end do
@@ -139,7 +142,7 @@ contains
       do i = 1, size(rest%y)
          call law%press_at(i, rest%y(i), force, slope)
          rest%slope(i) = law%prediction%stiffness(i, 3)*slope
-         rest%gap(i) = law%prediction%gap(i) + system%depth(i)
+         rest%gap(i) = law%prediction%gap_at(i, system%frequency()) + system%depth(i)
          if (rest%slope(i) > 0.0_wp) rest%gap(i) = rest%gap(i) + force/rest%slope(i) - &
                                                    rest%y(i)/law%prediction%stiffness(i, 3)
       end do
@@ -451,8 +454,8 @@ contains
             return
          end if
       end if
-      gap = system%problem%forces%entry(system%problem%forces%pairs)%law%prediction%gap(pair) + &
-            system%depth(pair)
+      gap = system%problem%forces%entry(system%problem%forces%pairs)%law%prediction%gap_at( &
+            pair, system%frequency()) + system%depth(pair)
    end function gap_of
 
    !> Force of an elastic pair about its position at rest over the amplitude of its displacement in
@@ -528,7 +531,8 @@ contains
             else if (allocated(rest%slope)) then
                tension(i) = rest%slope(i)*(opening(i) + rest%gap(i))
             else
-               tension(i) = p%stiffness(i, 3)*(opening(i) + p%gap(i) + system%depth(i))
+               tension(i) = p%stiffness(i, 3)*(opening(i) + p%gap_at(i, system%frequency()) + &
+                                              system%depth(i))
             end if
          end do
       end associate

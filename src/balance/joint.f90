@@ -263,6 +263,7 @@ contains
       type(element_list), intent(in) :: elements
       logical, intent(out), allocatable :: moving(:)
       integer :: i, c, n_moving
+      logical :: interferes
 
       allocate (moving(0:model%n_dof), source=.false.)
       if (model%cyclic%has_nodal()) then
@@ -277,8 +278,11 @@ contains
       end if
       do i = 1, contact%n_pairs
          ! An interference pushes both sides.
-         if (contact%gap(i) < 0.0_wp) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) &
-            = .true.
+         interferes = contact%gap(i) < 0.0_wp
+         ! With the speed it may come to do so.
+         if (allocated(contact%gap_rotation)) interferes = interferes .or. &
+            contact%gap_rotation(i) < 0.0_wp
+         if (interferes) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) = .true.
       end do
       ! The ground passes no motion on.
       moving(0) = .false.

@@ -267,7 +267,8 @@ contains
          case (normal_stiffness)
             if (p%takes(i) .or. len_trim(pressing) > 0) return
             call elongation(self, state, i, 3, input(:, 3))
-            if (presses(state, i)) input(1, 3) = input(1, 3) + p%gap(i) + state%depth(i)
+            if (presses(state, i)) input(1, 3) = input(1, 3) + &
+               p%gap_at(i, state%frequency()) + state%depth(i)
          case default ! acts through no input
          end select
       end associate

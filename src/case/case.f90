@@ -1,6 +1,8 @@
 !> A case: everything that one run needs, validated. Composed of the option types of the layers
 !> that use them; see each for its defaults.
 module fw_case
+   use fw_campbell_options, only: campbell_options
+   use fw_case_source, only: case_source
    use fw_body, only: body_type
    use fw_key, only: key, key_visitor
    use fw_key_range, only: at_least, from_to
@@ -22,7 +24,7 @@ module fw_case
 
    public :: analyses, case_type, output_options
    public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
-             analysis_modes, analysis_mode, analysis_resonance
+             analysis_modes, analysis_mode, analysis_resonance, analysis_campbell
 
    !> What the program knows of an analysis beside its word. A new one is a row of `analyses`, a
    !> line in fw_run and a file of its own.
@@ -38,14 +40,17 @@ module fw_case
       !> The frequency is an unknown; without a load.
       logical :: finds_frequency = .false., is_free = .false.
       logical :: wears = .false., is_resonance = .false., is_integrated = .false.
+      !> Over the rotation speed, which other analyses have one of.
+      logical :: is_campbell = .false.
    end type analysis_facts
 
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
                          analysis_time = 4, analysis_modes = 5, analysis_mode = 6, &
-                         analysis_resonance = 7
+                         analysis_resonance = 7, analysis_campbell = 8
    !> In the order of the constants.
    character(*), parameter :: analysis_words(*) = &
-      [character(9) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance']
+      [character(9) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance', &
+                       'campbell']
    type(analysis_facts), parameter :: analyses(*) = [ &
       analysis_facts(is_response=.true., is_sweep=.true.), &
       analysis_facts(is_response=.true.), &
@@ -53,7 +58,8 @@ module fw_case
       analysis_facts(is_integrated=.true., is_balanced=.false.), &
       analysis_facts(has_points=.false., is_balanced=.false.), &
       analysis_facts(is_free=.true., finds_frequency=.true.), &
-      analysis_facts(is_resonance=.true., finds_frequency=.true.)]
+      analysis_facts(is_resonance=.true., finds_frequency=.true.), &
+      analysis_facts(is_campbell=.true., has_points=.false., is_balanced=.false.)]
 
    !> What is written (group &output).
    type :: output_options
@@ -106,11 +112,22 @@ module fw_case
       type(mode_options) :: mode
       type(resonance_options) :: resonance
       type(stress_options) :: stress
+      type(campbell_options) :: campbell
+      !> What others are read from; not allocated where none is.
+      type(case_source), allocatable :: source
    contains
+      procedure :: is_source
       procedure :: bind_keys => bind_case_keys
    end type case_type
 
 contains
+
+   !> Whether other cases are read from this one.
+   pure logical function is_source(self)
+      class(case_type), intent(in) :: self
+
+      is_source = self%mission%is_wanted() .or. analyses(self%analysis)%is_campbell
+   end function is_source
 
    !> The keys of group &case.
    subroutine bind_case_keys(self, keys)
@@ -122,7 +139,8 @@ contains
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
                               'integration in time, natural frequencies, a nonlinear '// &
-                              'mode, or a resonance over a parameter'), &
+                              'mode, a resonance over a parameter, or frequencies over '// &
+                              'the rotation speed'), &
                           self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)

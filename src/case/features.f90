@@ -3,8 +3,8 @@
 !> The phrases stand in messages, so they name keys as the namelist has them. Those that begin with
 !> 'a law' are facts of the law of the pairs: a new law needs no new phrase.
 module fw_features
-   use fw_case, only: analysis_frf, analysis_mode, analysis_modes, analysis_point, &
-      analysis_resonance, analysis_time, analysis_wear, case_type
+   use fw_case, only: analysis_campbell, analysis_frf, analysis_mode, analysis_modes, &
+      analysis_point, analysis_resonance, analysis_time, analysis_wear, case_type
    use fw_contact_data, only: memory_carried
    use fw_control_options, only: of_first_harmonic
    use fw_force_law, only: law_facts
@@ -30,7 +30,9 @@ module fw_features
    character(*), parameter, public :: &
       matrices_alone = 'coriolis, structural damping, air or unsymmetric matrices', &
       hysteretic = 'structural damping (loss_factor) or forces of the air', &
-      stress = 'stress (group &stress, /stress of the model file)'
+      stress = 'stress (group &stress, /stress of the model file)', &
+      growing_stability = 'sweep%stability = .true. where gaps or normal loads grow', &
+      of_campbell = "case%analysis = 'campbell'"
 
 contains
 
@@ -106,6 +108,10 @@ contains
          asked = all(a /= [analysis_frf, analysis_point, analysis_wear])
       case ("case%analysis other than 'frf', 'point', 'resonance' or 'mode'")
          asked = all(a /= [analysis_frf, analysis_point, analysis_resonance, analysis_mode])
+      case (of_campbell)
+         asked = a == analysis_campbell
+      case ('model%rotation_speed')
+         asked = case%stress%rotation_speed > 0.0_wp
       case ('group &sensitivity')
          asked = case%sensitivity%is_wanted()
       case (stress)
@@ -175,6 +181,8 @@ contains
             asked = sweep%stability .and. case%analysis /= analysis_modes
          case ('sweep%speed_order')
             asked = sweep%speed_order > 0.0_wp
+         case (growing_stability)
+            asked = sweep%stability .and. case%contact%has_growth()
          case ('sweep%refine = .true.')
             asked = sweep%refine
          case ('a piece of a sweep')

@@ -4,25 +4,13 @@ module fw_mission_options
    use fw_key, only: key, key_visitor
    use fw_key_range, only: above, at_least, at_most, from_to, operator(.and.)
    use fw_kinds, only: wp
-   use fw_raw_model, only: raw_model
    use fw_text, only: string_type
    implicit none (type, external)
    private
 
-   public :: mission_options, mission_source
+   public :: mission_options
 
    integer, parameter :: most_blocks = 10000
-
-   !> What the case was read from: each block is read from it once more, with its change on top.
-   type :: mission_source
-      character(:), allocatable :: path
-      !> Not allocated where the path names the file.
-      character(:), allocatable :: text
-      type(string_type), allocatable :: overrides(:)
-      !> The model where the calling program gives it.
-      type(raw_model), allocatable :: model
-      logical :: tries_files = .false.
-   end type mission_source
 
    type :: mission_options
       !> Blocks of a flight; 0: no mission.
@@ -35,7 +23,6 @@ module fw_mission_options
       type(string_type), allocatable :: change(:), name(:)
       !> Flights that are taken together (0: as many as the error allows).
       integer :: flights_per_jump = 0
-      type(mission_source), allocatable :: source
    contains
       procedure :: bind_keys
       procedure :: is_wanted

@@ -71,6 +71,8 @@ contains
       model%damping = model%damping + options%rayleigh_mass*model%mass &
                       + options%rayleigh_stiffness*model%stiffness
       model%rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)
+      model%turns = model%rotates .or. allocated(raw%coriolis) .or. &
+                    allocated(raw%circulatory) .or. raw%contact%has_growth()
       ! Before the matrices below are added, which it is no part of.
       call add_loss(options, raw, model)
       call add_unsymmetric(options, raw, model)

@@ -146,6 +146,10 @@ contains
       call to%bind(part('contact/area', each, 'of a pair'), pairs%area)
       call to%bind(part('contact/normal_load', each, 'constant compressive force of pairs '// &
                         'without a normal dof'), pairs%normal_load)
+      call to%bind(part('contact/gap_rotation', each, 'added to the gap, for each square of '// &
+                        'the rotation speed'), pairs%gap_rotation)
+      call to%bind(part('contact/normal_load_rotation', each, 'added to normal_load, for each '// &
+                        'square of the rotation speed'), pairs%normal_load_rotation)
       do k = 1, size(to%constants)
          associate (key => to%constants(k))
             if (allocated(values)) deallocate (values)

@@ -6,8 +6,8 @@
 module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_features, only: asks_for, feature_length, feature_text, hysteretic, matrices_alone, &
-      stress
+   use fw_features, only: growing_stability, asks_for, feature_length, feature_text, hysteretic, &
+      matrices_alone, of_campbell, stress
    implicit none (type, external)
    private
 
@@ -134,6 +134,10 @@ module fw_rules
       rule_type('group &cyclic', "solver%kind = 'pseudo_time'", "use 'newton'"), &
       rule_type('group &cyclic', 'output%tail', 'take more n_harmonics')]
 
+   !> The speed goes from one end of the diagram to the other.
+   type(rule_type), parameter :: of_diagrams(*) = [ &
+      rule_type(of_campbell, 'model%rotation_speed', 'give campbell%start and end')]
+
    !> Matrices without a time domain, or those that this part of the program does not take.
    type(rule_type), parameter :: of_matrices(*) = [ &
       rule_type(hysteretic, "case%analysis = 'time'", &
@@ -145,6 +149,8 @@ module fw_rules
       rule_type(matrices_alone, 'output%tail', 'take more n_harmonics'), &
       rule_type('sweep%speed_order', "case%analysis other than 'frf' or 'point'", &
                 'give model%rotation_speed'), &
+      rule_type('sweep%speed_order', growing_stability, &
+                'leave stability out, or give model%rotation_speed, speed by speed'), &
       rule_type('sweep%speed_order', 'sweep%parameter', &
                 'the speed follows the frequency: sweep over this')]
 
@@ -216,7 +222,7 @@ module fw_rules
 
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
                                              of_matrices, of_laws, of_base, of_elements, of_wear, &
-                                             of_derivatives, of_stress]
+                                             of_derivatives, of_stress, of_diagrams]
 
 contains
 

@@ -31,7 +31,7 @@ module fw_frequency_response
    implicit none (type, external)
    private
 
-   public :: response_analysis
+   public :: new_strategy, response_analysis
 
    !> Takes the rows that have one period of the pairs that dissipate most, and keeps that of the
    !> highest.

@@ -83,6 +83,9 @@ module fw_remark_table
                   'order above 1/5 of it, whose error nothing estimates'), &
       remark_kind('profile depends on steps', &
                   'wear: with check_steps, halved steps move the profile by more than 2 %'), &
+      remark_kind('campbell points', &
+                  'campbell: frequencies near a crossing that could not be solved: its peak '// &
+                  'may be missed'), &
       remark_kind('derivatives of instants', &
                   '&sensitivity with contact decided at instants: take sampling = '// &
                   '''events'''), &

@@ -3,8 +3,8 @@ module fw_run
    use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_analysis, only: analysis, run_type
-   use fw_case, only: analyses, analysis_mode, analysis_modes, analysis_resonance, analysis_wear, &
-      case_type
+   use fw_case, only: analyses, analysis_campbell, analysis_mode, analysis_modes, &
+      analysis_resonance, analysis_wear, case_type
    use fw_combinations, only: check_combinations
    use fw_error, only: error_type
    use fw_frequency_response, only: response_analysis
@@ -15,6 +15,7 @@ module fw_run
    use fw_problem, only: threads_for
    use fw_remarks, only: remark_input
    use fw_restart_file, only: read_restart, restart_type
+   use fw_run_campbell, only: campbell_analysis
    use fw_run_mode, only: mode_analysis
    use fw_run_modes, only: modes_analysis
    use fw_run_resonance, only: resonance_analysis
@@ -39,6 +40,7 @@ contains
 
       select case (case%analysis)
       case (analysis_modes); allocate (modes_analysis :: work)
+      case (analysis_campbell); allocate (campbell_analysis :: work)
       case (analysis_mode); allocate (mode_analysis :: work)
       case (analysis_resonance); allocate (resonance_analysis :: work)
       case (analysis_wear)

@@ -19,6 +19,9 @@ module fw_whirl_modes
    !> Roots beyond this many of the largest stiffness over mass, or without direction, are those of
    !> massless motions.
    real(wp), parameter :: infinite = 1.0e-12_wp
+   !> Below this part of itself the frequency of a root is round-off: what is overdamped, or has no
+   !> mass, creeps.
+   real(wp), parameter :: least_turn = 1.0e-6_wp
 
    !> Of a signed nodal diameter.
    type :: wave_matrices
@@ -87,7 +90,7 @@ contains
       if (info == 0) then
          do i = 1, 2*n
             if (abs(beta(i)) <= infinite*abs(alpha(i))) cycle
-            if (aimag(alpha(i)/beta(i)) > infinite*abs(alpha(i)/beta(i))) chosen = [chosen, i]
+            if (aimag(alpha(i)/beta(i)) > least_turn*abs(alpha(i)/beta(i))) chosen = [chosen, i]
          end do
       end if
       root = scale*alpha(chosen)/beta(chosen)

@@ -41,6 +41,11 @@ module fw_contact_data
       real(wp), allocatable :: area(:)
       !> Constant compressive force of pairs without a normal dof [force] (n_pairs).
       real(wp), allocatable :: normal_load(:)
+      !> What a rotation speed adds to gap and normal load, for each of its squares [length s**2],
+      !> [force s**2] (n_pairs), and frequency over speed where this follows the frequency: where it
+      !> does not, both hold them already.
+      real(wp), allocatable :: gap_rotation(:), normal_load_rotation(:)
+      real(wp) :: speed_order = 0.0_wp
       !> Stiffnesses of elastic pairs [force/length] (n_pairs).
       real(wp), allocatable :: tangential_stiffness(:), normal_stiffness(:)
       !> How each pair presses, a number in `normal_words` (fw_normal_law) (n_pairs); unilateral
@@ -64,6 +69,9 @@ module fw_contact_data
       logical :: law_is_of_model = .false.
       !> No law was given, and the program took one; no input.
       logical :: law_is_chosen = .false.
+   contains
+      procedure :: turn
+      procedure :: has_growth
    end type contact_type
 
    !> Nonlinear springs: force coefficient * u_r**power (group &spring).
@@ -76,5 +84,28 @@ module fw_contact_data
       !> As of contact_type (n_springs).
       integer, allocatable :: sector_2(:)
    end type spring_type
+
+contains
+
+   !> Take a rotation speed [rad/s], or the order along which it follows the frequency.
+   pure subroutine turn(self, speed, order)
+      class(contact_type), intent(inout) :: self
+      !> 0: none.
+      real(wp), intent(in) :: speed, order
+
+      self%speed_order = order
+      if (speed <= 0.0_wp) return
+      if (allocated(self%gap_rotation)) self%gap = self%gap + speed**2*self%gap_rotation
+      if (.not. allocated(self%normal_load_rotation)) return
+      ! A load that has gone presses no more.
+      self%normal_load = max(0.0_wp, self%normal_load + speed**2*self%normal_load_rotation)
+   end subroutine turn
+
+   !> Whether gaps or normal loads depend on the rotation speed.
+   pure logical function has_growth(self)
+      class(contact_type), intent(in) :: self
+
+      has_growth = allocated(self%gap_rotation) .or. allocated(self%normal_load_rotation)
+   end function has_growth
 
 end module fw_contact_data

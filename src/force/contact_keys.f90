@@ -16,8 +16,8 @@ module fw_contact_keys
    private
 
    public :: ask_laws, bind_pairs, bind_law, bind_normal_law, bind_table, bind_sides, &
-             bind_friction, bind_gap, bind_normal_load, bind_laws, bind_march, bind_worn, &
-             bind_n_springs, bind_springs
+             bind_friction, bind_gap, bind_growth, bind_normal_load, bind_laws, bind_march, &
+             bind_worn, bind_n_springs, bind_springs
 
    !> More pairs or springs are taken for a mistake.
    integer, parameter :: most = 1000000
@@ -156,6 +156,21 @@ contains
                          'n_pairs', absent=of_file//', else required with friction', &
                          only='pairs without a normal dof'), contact%normal_load, needed)
    end subroutine bind_normal_load
+
+   !> What a rotation speed adds to gaps and normal loads.
+   subroutine bind_growth(keys, contact)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      character(*), parameter :: with_speed = 'rotation_speed, speed_order, campbell'
+
+      call keys%bind(key('gap_rotation', 'added to gap, for each (rad/s)^2 of the rotation speed', &
+                         unit='L s^2', shape='n_pairs', absent=of_file//', else none', &
+                         only=with_speed), contact%gap_rotation)
+      call keys%bind(key('normal_load_rotation', 'added to normal_load, for each (rad/s)^2 of '// &
+                         'the rotation speed', unit='F s^2', shape='n_pairs', &
+                         absent=of_file//', else none', only=with_speed), &
+                     contact%normal_load_rotation)
+   end subroutine bind_growth
 
    !> Which constants the laws have, and which of them pairs need: the visitor is not asked for any.
    subroutine ask_laws(keys, contact, slides, closes)

@@ -61,7 +61,13 @@ module fw_force_law
       !> Added to the displacement of the last component [length], and what its input is where it
       !> does not exist: minus the dead load [force] (n_elements).
       real(wp), allocatable :: gap(:), load(:)
+      !> What is added to them for each square of the frequency, where a rotation speed follows it;
+      !> not allocated elsewhere (n_elements).
+      real(wp), allocatable :: gap_growth(:), load_growth(:)
    contains
+      procedure :: gap_at
+      procedure :: load_at
+      procedure :: grows
       procedure :: order_of
       procedure :: in_time
       procedure :: takes
@@ -402,7 +408,36 @@ contains
       end associate
    end subroutine form_jacobian
 
-   !> The constant part of the inputs, before evaluations.
+   !> The gap of an element at a frequency [rad/s].
+   elemental real(wp) function gap_at(self, element, omega)
+      class(prediction_type), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: omega
+
+      gap_at = self%gap(element)
+      if (allocated(self%gap_growth)) gap_at = gap_at + omega**2*self%gap_growth(element)
+   end function gap_at
+
+   !> The dead load of an element at a frequency [rad/s].
+   elemental real(wp) function load_at(self, element, omega)
+      class(prediction_type), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: omega
+
+      load_at = self%load(element)
+      ! A load that has gone presses no more.
+      if (allocated(self%load_growth)) load_at = max(0.0_wp, load_at + &
+                                                     omega**2*self%load_growth(element))
+   end function load_at
+
+   !> Whether gaps or dead loads depend on the frequency.
+   pure logical function grows(self)
+      class(prediction_type), intent(in) :: self
+
+      grows = allocated(self%gap_growth) .or. allocated(self%load_growth)
+   end function grows
+
+   !> The constant part of the inputs, before evaluations at `work%rate`.
    pure subroutine set_offset(self, depth, work)
       class(force_law), intent(in) :: self
       !> Wear depth, on top of the gap (n_elements) [length].
@@ -413,8 +448,9 @@ contains
       last = self%n_components
       associate (p => self%prediction)
          do i = 1, self%n_elements
-            work%offset(i) = -p%load(i)
-            if (self%present(last, i)) work%offset(i) = p%stiffness(i, last)*(p%gap(i) + depth(i))
+            work%offset(i) = -p%load_at(i, work%rate)
+            if (self%present(last, i)) work%offset(i) = p%stiffness(i, last)* &
+                                                        (p%gap_at(i, work%rate) + depth(i))
          end do
       end associate
    end subroutine set_offset

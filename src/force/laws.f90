@@ -138,6 +138,11 @@ contains
       part%mu = contact%mu(pair)
       part%gap = contact%gap(pair)
       part%normal_load = contact%normal_load(pair)
+      part%speed_order = contact%speed_order
+      if (allocated(contact%gap_rotation)) part%gap_rotation = contact%gap_rotation(pair)
+      if (allocated(contact%normal_load_rotation)) then
+         part%normal_load_rotation = contact%normal_load_rotation(pair)
+      end if
       part%constants = contact%constants%of_pairs(pair)
       call take_normal_part(contact, pair, part)
       if (allocated(contact%tangential_stiffness)) then

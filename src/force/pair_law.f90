@@ -2,7 +2,7 @@
 !> either constant or from the distance of the two sides.
 module fw_pair_law
    use fw_contact_data, only: contact_type
-   use fw_force_law, only: force_law, force_workspace
+   use fw_force_law, only: prediction_type, force_law, force_workspace
    use fw_fourier, only: fourier_type
    use fw_key, only: key, key_type, key_visitor
    use fw_key_range, only: at_least
@@ -64,8 +64,23 @@ contains
          p%load = merge(contact%normal_load, 0.0_wp, contact%side_1(3, :) == 0 .and. &
                         contact%side_2(3, :) == 0)
       end associate
+      call take_growth(contact, self%prediction)
       call self%take_constants(contact)
    end subroutine build
+
+   !> Of gaps and normal loads, where the rotation speed follows the frequency.
+   pure subroutine take_growth(contact, prediction)
+      type(contact_type), intent(in) :: contact
+      type(prediction_type), intent(inout) :: prediction
+
+      if (contact%speed_order <= 0.0_wp) return
+      if (allocated(contact%gap_rotation)) then
+         prediction%gap_growth = contact%gap_rotation/contact%speed_order**2
+      end if
+      if (allocated(contact%normal_load_rotation)) then
+         prediction%load_growth = contact%normal_load_rotation/contact%speed_order**2
+      end if
+   end subroutine take_growth
 
    !> Keys that belong to this law, for the pairs of a case: without a law's own say it has none.
    subroutine bind_keys(self, keys, contact, slides, closes)

@@ -93,6 +93,8 @@ contains
             self%prediction%stiffness(at, :) = law%prediction%stiffness
             self%prediction%gap(at) = law%prediction%gap
             self%prediction%load(at) = law%prediction%load
+            call join_growth(law%prediction%gap_growth, at, n, self%prediction%gap_growth)
+            call join_growth(law%prediction%load_growth, at, n, self%prediction%load_growth)
             self%prediction%own(at) = input_facts(law%prediction%order, law%prediction%by_time, &
                                                   law%prediction%takes_balance, &
                                                   law%prediction%has_inertia)
@@ -108,6 +110,17 @@ contains
       end associate
       call find_facts(self)
    end subroutine join
+
+   !> What grows of some pairs among all.
+   pure subroutine join_growth(growth, at, n, joined)
+      real(wp), allocatable, intent(in) :: growth(:)
+      integer, intent(in) :: at(:), n
+      real(wp), allocatable, intent(inout) :: joined(:)
+
+      if (.not. allocated(growth)) return
+      if (.not. allocated(joined)) allocate (joined(n), source=0.0_wp)
+      joined(at) = growth
+   end subroutine join_growth
 
    subroutine find_facts(self)
       class(several_laws), intent(inout) :: self

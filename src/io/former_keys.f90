@@ -21,7 +21,7 @@ module fw_former_keys
    type(former_key), parameter :: former(*) = [ &
       former_key('harmonics', 'adaptive', of_levels), &
       former_key('harmonics', 'adaptive_tolerance', of_levels), &
-      former_key('sweep', 'frequencies', 'use sweep%values, which takes the same list'), &
+      former_key('sweep', 'frequencies', 'is read as sweep%values: keep one of the two'), &
       former_key('sweep', 'first_point', of_pieces), &
       former_key('sweep', 'last_point', of_pieces), &
       former_key('sweep', 'lead_points', of_pieces), &

@@ -1,13 +1,12 @@
 !> A block of a mission as a case of its own: the case with the change of the block on top.
 module fw_mission_block
    use fw_case, only: case_type
+   use fw_changed_case, only: read_changed
    use fw_error, only: error_type, fatal_error, status_input
    use fw_contact_data, only: contact_type
    use fw_kinds, only: wp
-   use fw_read_case, only: case_input, read_input
    use fw_read_mission, only: split_change
    use fw_text, only: string_type, to_text
-   use fw_text_list, only: append
    implicit none (type, external)
    private
 
@@ -21,27 +20,10 @@ contains
       integer, intent(in) :: number
       type(case_type), intent(out) :: block
       type(error_type), allocatable, intent(out) :: error
-      type(case_input) :: input
       type(string_type), allocatable :: items(:)
-      integer :: i
 
-      associate (source => case%mission%source)
-         input%path = source%path
-         if (allocated(source%text)) input%text = source%text
-         input%overrides = source%overrides
-         input%origin = '&mission change('//to_text(number)//')'
-         input%tries_files = source%tries_files
-         input%is_block = .true.
-         call split_change(case%mission%change(number)%text, items)
-         do i = 1, size(items)
-            call append(input%overrides, items(i)%text)
-         end do
-         if (allocated(source%model)) then
-            call read_input(input, block, error, source%model)
-         else
-            call read_input(input, block, error)
-         end if
-      end associate
+      call split_change(case%mission%change(number)%text, items)
+      call read_changed(case, items, '&mission change('//to_text(number)//')', block, error)
       if (.not. allocated(error)) call check_alike(case, number, block, error)
       if (allocated(error)) return
       block%mission%n_blocks = 0

@@ -145,6 +145,9 @@ contains
          reason = 'matrices of a cyclic structure (&cyclic) are not served yet'
       else if (number == rotation_speed .and. .not. case%model%rotates) then
          reason = 'the model has no stiffness_rotation and no load static_rotation'
+      else if (number == rotation_speed .and. case%contact%has_growth()) then
+         reason = 'gaps or normal loads grow with it (gap_rotation, normal_load_rotation): run '// &
+                  'value by value'
       end if
    end subroutine check_of_matrices
 

@@ -19,7 +19,8 @@ module fw_read_case
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
-   use fw_read_options, only: read_harmonics, read_mission, read_mode, read_stress, read_sweep
+   use fw_read_options, only: read_campbell, read_harmonics, read_mission, read_mode, read_stress, &
+      read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
    use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
@@ -52,8 +53,8 @@ module fw_read_case
       character(:), allocatable :: origin
       !> Try model files in a process of their own first: for programs of one thread.
       logical :: tries_files = .false.
-      !> A block of a mission, which is read from the source that the case has kept.
-      logical :: is_block = .false.
+      !> One of the cases that are read from a source which another has kept.
+      logical :: is_changed = .false.
    end type case_input
 
    !> Harmonics of a nonlinear mode, a resonance or a controlled response where nothing is said of
@@ -134,7 +135,7 @@ contains
       call reader%finish(error)
       if (allocated(error)) return
       case%namelist = reader%effective()
-      if (case%mission%is_wanted() .and. .not. input%is_block) then
+      if (case%is_source() .and. .not. input%is_changed) then
          call keep_source(input, case, memory_model)
       end if
       call check_combinations(case, error)
@@ -142,14 +143,14 @@ contains
       if (.not. allocated(error)) call check_sensitivity(case, error)
    end subroutine read_groups
 
-   !> What the blocks of a mission are read from.
+   !> What other cases are read from.
    subroutine keep_source(input, case, memory_model)
       type(case_input), intent(in) :: input
       type(case_type), intent(inout) :: case
       type(raw_model), intent(in), optional :: memory_model
 
-      allocate (case%mission%source)
-      associate (source => case%mission%source)
+      allocate (case%source)
+      associate (source => case%source)
          source%path = input%path
          if (allocated(input%text)) source%text = input%text
          source%overrides = input%overrides
@@ -287,6 +288,7 @@ contains
       call read_mission(reader, directory_of(path), case%mission, case%inputs)
       call case%time%bind_keys(reader)
       call read_mode(reader, case%analysis, case%mode)
+      call read_campbell(reader, case%analysis, case%campbell)
       call read_stress(reader, case%stress)
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)
@@ -413,6 +415,10 @@ contains
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
+      call case%contact%turn(options%rotation_speed, options%speed_order)
+      ! What finds whether anything depends on the speed looks there.
+      call take(case%contact%gap_rotation, raw%contact%gap_rotation)
+      call take(case%contact%normal_load_rotation, raw%contact%normal_load_rotation)
       call read_worn(reader, directory_of(path), case%contact, worn, error)
       if (allocated(error)) return
       if (allocated(worn)) then
@@ -447,6 +453,17 @@ contains
          if (allocated(raw%title)) case%title = raw%title
          call reader%amend('case', 'title', quoted_text(case%title))
       end if
+
+   contains
+
+      pure subroutine take(values, copy)
+         real(wp), allocatable, intent(in) :: values(:)
+         real(wp), allocatable, intent(inout) :: copy(:)
+
+         if (allocated(copy)) deallocate (copy)
+         if (allocated(values)) copy = values
+      end subroutine take
+
    end subroutine read_structure
 
 end module fw_read_case

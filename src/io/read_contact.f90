@@ -5,7 +5,7 @@
 module fw_read_contact
    use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
-      bind_normal_load, bind_laws, bind_march, bind_n_springs, bind_springs
+      bind_growth, bind_normal_load, bind_laws, bind_march, bind_n_springs, bind_springs
    use fw_key_range, only: range_type
    use fw_kinds, only: wp
    use fw_law_text, only: law_text
@@ -77,6 +77,8 @@ contains
          call repeat_values(n_file, n_sectors, contact%gap)
          call repeat_values(n_file, n_sectors, contact%area)
          call repeat_values(n_file, n_sectors, contact%normal_load)
+         call repeat_values(n_file, n_sectors, contact%gap_rotation)
+         call repeat_values(n_file, n_sectors, contact%normal_load_rotation)
          call contact%constants%offer_all(file_pairs%constants, n_file, n_sectors)
       else if (n_file > 0 .and. contact%n_pairs > 0 &
                .and. .not. reader%given('contact', 'side_1')) then
@@ -214,8 +216,12 @@ contains
          call reader%refuse('contact', 'normal_load', 'has no meaning: every pair has a normal '// &
                             'dof; press the pairs together with &load static or a negative gap')
       end if
+      call bind_growth(reader, contact)
       ! One value for all may have been meant for the others.
       where (closes) contact%normal_load = 0.0_wp
+      if (allocated(contact%normal_load_rotation)) then
+         where (closes) contact%normal_load_rotation = 0.0_wp
+      end if
    end subroutine read_constants
 
    !> Constants that belong to some laws, and to no others.

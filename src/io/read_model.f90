@@ -355,8 +355,9 @@ contains
 
       if (speed <= 0.0_wp .or. rotates(raw)) return
       call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
-                         'stiffness_rotation, no coriolis, no circulatory and no load '// &
-                         'static_rotation: remove it, or use a model file that holds them')
+                         'stiffness_rotation, no coriolis, no circulatory, no load '// &
+                         'static_rotation and no contact gap_rotation or normal_load_rotation: '// &
+                         'remove it, or use a model file that holds them')
    end subroutine check_rotation
 
    !> A speed that follows the frequency.
@@ -370,11 +371,15 @@ contains
       if (options%rotation_speed > 0.0_wp) then
          reason = 'does not go with model%rotation_speed: the speed follows the frequency; '// &
                   'keep one of the two'
-      else if (model%cyclic%has_sectors()) then
-         reason = 'does not go with &cyclic: give model%rotation_speed, speed by speed'
+      else if (model%cyclic%has_nodal()) then
+         reason = 'does not go with matrices of nodal diameters: give model%rotation_speed, '// &
+                  'speed by speed'
+      else if (model%cyclic%is_mistuned) then
+         reason = 'does not go with cyclic%mistuned: give model%rotation_speed, speed by speed'
       else if (.not. rotates(raw)) then
          reason = 'is given, but nothing of the model depends on the rotation speed '// &
-                  '(stiffness_rotation, coriolis, circulatory, load static_rotation): remove it'
+                  '(stiffness_rotation, coriolis, circulatory, load static_rotation, contact '// &
+                  'gap_rotation, normal_load_rotation): remove it'
       else if (options%modal_damping > 0.0_wp .and. allocated(raw%stiffness_rotation)) then
          reason = 'does not go with model%modal_damping, whose modes would change with '// &
                   'stiffness_rotation: give damping, or rayleigh_stiffness'
@@ -387,7 +392,8 @@ contains
       type(raw_model), intent(in) :: raw
 
       rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation) .or. &
-                allocated(raw%coriolis) .or. allocated(raw%circulatory)
+                allocated(raw%coriolis) .or. allocated(raw%circulatory) .or. &
+                raw%contact%has_growth()
    end function rotates
 
    !> A model that is no sector becomes the only one where its matrices ask for it.

@@ -3,6 +3,7 @@
 !> Single values have passed the range of their key already (fw_key_range). Here are the refusals
 !> that need two keys or the analysis, and what follows from other keys where one is left out.
 module fw_read_options
+   use fw_campbell_options, only: campbell_options, most_orders
    use fw_case, only: analyses
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
       instants_per_event_wave, most_for_accuracy
@@ -20,7 +21,7 @@ module fw_read_options
    implicit none (type, external)
    private
 
-   public :: read_harmonics, read_mission, read_mode, read_stress, read_sweep
+   public :: read_campbell, read_harmonics, read_mission, read_mode, read_stress, read_sweep
 
    !> Responses that are put together from a mode.
    integer, parameter :: most_scales = 100
@@ -213,6 +214,35 @@ contains
                             ' factors: at most '//to_text(most_scales)//' are served')
       end if
    end subroutine read_mode
+
+   !> Group &campbell.
+   subroutine read_campbell(reader, analysis, options)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: analysis
+      type(campbell_options), intent(inout) :: options
+      integer :: n
+
+      call options%bind_keys(reader, analyses(analysis)%is_campbell)
+      if (.not. analyses(analysis)%is_campbell .or. reader%failed()) return
+      if (options%end <= options%start) then
+         call reader%refuse('campbell', 'end', '= '//number_text(options%end)//': must be '// &
+                            'above start = '//number_text(options%start)//', the lowest speed')
+      end if
+      n = size(options%orders)
+      if (n == 0 .or. any(options%orders == 0)) then
+         call reader%refuse('campbell', 'orders', 'must be engine orders other than 0, whose '// &
+                            'loads vibrate')
+      else if (n > most_orders) then
+         call reader%refuse('campbell', 'orders', 'has '//to_text(n)//' orders: at most '// &
+                            to_text(most_orders)//' are served')
+      end if
+      if (.not. allocated(options%order_scale)) return
+      if (all(size(options%order_scale) /= [1, n])) then
+         call reader%refuse('campbell', 'order_scale', 'has '// &
+                            to_text(size(options%order_scale))//' factors: must be one, or one '// &
+                            'for each of the '//to_text(n)//' orders')
+      end if
+   end subroutine read_campbell
 
    !> Group &stress, behind what the model says of it.
    subroutine read_stress(reader, options)

@@ -99,7 +99,21 @@ contains
 
       allocate (reader%sizes(0))
       call reader%parse(text, source, overrides, error, origin)
+      if (.not. allocated(error)) call take_renamed(reader)
    end subroutine new_reader
+
+   !> A key under the name that it had.
+   subroutine take_renamed(self)
+      class(reader_type), intent(inout) :: self
+      integer :: i
+
+      do i = 1, self%namelist%n_entries
+         associate (entry => self%namelist%entries(i))
+            if (entry%group /= 'sweep' .or. entry%key /= 'frequencies') cycle
+            if (.not. self%given('sweep', 'values')) entry%key = 'values'
+         end associate
+      end do
+   end subroutine take_renamed
 
    !> Keys bound from now on belong to this group; its help is for the list of keys.
    subroutine open(self, group, help)

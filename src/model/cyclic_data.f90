@@ -9,7 +9,7 @@ module fw_cyclic_data
    implicit none (type, external)
    private
 
-   public :: cyclic_type, nodal_matrices, influence_type, speed_matrices
+   public :: cyclic_type, nodal_matrices, influence_type, nodal_speed, speed_matrices
 
    !> The sector tied to its neighbours, as it moves in one nodal diameter.
    type :: nodal_matrices
@@ -65,6 +65,17 @@ module fw_cyclic_data
       !> f_r (n_dof).
       real(wp), allocatable :: load(:)
    end type speed_matrices
+
+   !> The same of a tied sector in a nodal diameter 0 .. N/2 (n, n), (n): the load acts in
+   !> harmonic 0 alone.
+   type :: nodal_speed
+      real(wp) :: order = 0.0_wp
+      complex(wp), allocatable :: coriolis(:, :), circulatory(:, :), stiffness(:, :), &
+         damping(:, :), structural(:, :)
+      complex(wp), allocatable :: load(:)
+   contains
+      procedure :: in_basis
+   end type nodal_speed
 
    type :: cyclic_type
       logical :: is_cyclic = .false.
@@ -184,6 +195,31 @@ contains
       has_whirl = allocated(self%coriolis) .or. allocated(self%aero)
    end function has_whirl
 
+   !> The coordinates of u = T q.
+   pure function in_basis(self, t) result(reduced)
+      class(nodal_speed), intent(in) :: self
+      complex(wp), intent(in) :: t(:, :)
+      type(nodal_speed) :: reduced
+
+      reduced%order = self%order
+      call take(self%coriolis, reduced%coriolis)
+      call take(self%circulatory, reduced%circulatory)
+      call take(self%stiffness, reduced%stiffness)
+      call take(self%damping, reduced%damping)
+      call take(self%structural, reduced%structural)
+      if (allocated(self%load)) reduced%load = matmul(conjg(transpose(t)), self%load)
+
+   contains
+
+      pure subroutine take(matrix, changed)
+         complex(wp), allocatable, intent(in) :: matrix(:, :)
+         complex(wp), allocatable, intent(inout) :: changed(:, :)
+
+         if (allocated(matrix)) changed = matmul(conjg(transpose(t)), matmul(matrix, t))
+      end subroutine take
+
+   end function in_basis
+
    !> Add hysteretic damping i D, D being Hermitian, to what the waves in both directions feel.
    pure subroutine add_structural(self, matrix)
       class(nodal_matrices), intent(inout) :: self
@@ -225,11 +261,19 @@ contains
       integer :: k
 
       splits_waves = allocated(self%coriolis) .or. allocated(self%air) .or. &
-                     allocated(self%circulatory) .or. (self%is_alone .and. &
+                     allocated(self%circulatory) .or. turns(self%speed) .or. (self%is_alone .and. &
                                                        allocated(self%structural))
       if (splits_waves .or. .not. allocated(self%nodal)) return
       splits_waves = any([(allocated(self%nodal(k)%coriolis), k=1, size(self%nodal))])
    end function splits_waves
+
+   !> Whether forces follow a speed that differ for waves in both directions.
+   pure logical function turns(speed)
+      type(speed_matrices), allocatable, intent(in) :: speed
+
+      turns = .false.
+      if (allocated(speed)) turns = allocated(speed%coriolis) .or. allocated(speed%circulatory)
+   end function turns
 
    !> - sum_m Q_m z**m of a signed nodal diameter (a, a); allocated only where it is known.
    pure subroutine air_stiffness(self, k, stiffness)

@@ -4,13 +4,13 @@
 !> for k and N - k, whose matrices are conjugates. Z_r is formed at each frequency.
 module fw_cyclic_structure
    use fw_complex_form, only: amplitudes_of, coefficients_of
-   use fw_cyclic_data, only: nodal_matrices
+   use fw_cyclic_data, only: nodal_matrices, nodal_speed
    use fw_cyclic_relative, only: cyclic_relative
    use fw_error, only: error_type, fatal_error, status_input
    use fw_formed_stiffness, only: formed_stiffness
    use fw_kinds, only: wp
    use fw_model, only: model_type
-   use fw_sector, only: sector_at
+   use fw_sector, only: sector_at, speed_at
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
    use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, &
@@ -123,8 +123,10 @@ contains
       type(cyclic_structure), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices), allocatable :: nodal(:)
+      type(nodal_speed) :: speed
       integer, allocatable :: used(:), slot(:)
       integer :: h, j, n_kept
+      logical :: follows
 
       call require_air(model, self, error)
       if (allocated(error)) return
@@ -136,7 +138,6 @@ contains
          if (allocated(error)) return
          if (allocated(model%cyclic%speed)) then
             call self%basis(j)%keep_dofs(used(j), size(nodal(j)%mass, 1), relative%at(used(j) + 1))
-            call self%basis(j)%take_speed(model%cyclic%speed)
             cycle
          end if
          call self%basis(j)%find_modes(used(j), nodal(j), relative%at(used(j) + 1), error)
@@ -158,12 +159,22 @@ contains
          call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range, &
                                             nodal(j)%has_whirl(), nodal(j))
       end do
-      self%n_coordinates = self%n_relative + sum([(size(self%basis(j)%kept), j=1, size(used))])
-      allocate (self%kept(0))
+      ! Free dofs are those of all nodal diameters, modes are of one.
+      follows = allocated(model%cyclic%speed)
+      n_kept = sum([(size(self%basis(j)%kept), j=1, size(used))])
+      if (follows) n_kept = maxval([(size(self%basis(j)%kept), j=1, size(used))])
+      self%n_coordinates = self%n_relative + n_kept
+      self%kept = [(h, h=1, merge(n_kept, 0, follows))]
       n_kept = 0
       do j = 1, size(used)
          slot = [relative%slots(used(j)), (self%n_relative + n_kept + h, &
                                           h=1, size(self%basis(j)%kept))]
+         if (follows) then
+            call speed_at(model, used(j), speed)
+            call self%basis(j)%take_speed(speed, self%n_coordinates, slot)
+            call self%basis(j)%transform(nodal(j), slot, self%n_coordinates)
+            cycle
+         end if
          n_kept = n_kept + size(self%basis(j)%kept)
          ! Numbers that tell nodal diameters apart too.
          self%kept = [self%kept, used(j)*most_modes + self%basis(j)%kept]
@@ -451,7 +462,8 @@ contains
                                state%load_factor(h), amplitude(:, h), slopes(:, h))
             if (parameter /= by_frequency) cycle
             if (allocated(self%basis(self%basis_of(h))%speed)) call add_speed_slope( &
-               self%basis(self%basis_of(h))%speed, self%harmonic(h), state%omega, &
+               self%basis(self%basis_of(h))%speed, self%harmonic(h), self%conjugated(h), &
+               state%omega, &
                state%load_factor(h), amplitude(:, h), slopes(:, h))
          end do
       end select

@@ -42,6 +42,8 @@ module fw_model
       real(wp) :: loss_factor = 0.0_wp
       !> Whether something of it depends on the rotation speed.
       logical :: rotates = .false.
+      !> The same, forces across the motion included.
+      logical :: turns = .false.
       !> What parameters change, of those that were asked for; not allocated where none was.
       type(matrix_change), allocatable :: changes(:)
       !> Loads beside those of the first harmonic: what they are, and their cosine and sine parts

@@ -6,7 +6,7 @@
 !> T being the identity but for the right interface, which is no coordinate any more. Where the
 !> model holds matrices of nodal diameters, T is the identity of the physical coordinates.
 module fw_sector
-   use fw_cyclic_data, only: nodal_matrices
+   use fw_cyclic_data, only: nodal_matrices, nodal_speed
    use fw_damping, only: add_modal_damping
    use fw_error, only: error_type
    use fw_hermitian, only: complex_part, real_form
@@ -15,7 +15,7 @@ module fw_sector
    implicit none (type, external)
    private
 
-   public :: sector_at, sector_rows, damp_modes, add_sector_spring
+   public :: sector_at, speed_at, sector_rows, damp_modes, add_sector_spring
 
 contains
 
@@ -54,6 +54,31 @@ contains
          call damp_modes(model%cyclic%modal_damping, nodal, error)
       end if
    end subroutine sector_at
+
+   !> What follows the speed, in nodal diameter k = 0 .. N/2.
+   subroutine speed_at(model, k, nodal)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      type(nodal_speed), intent(out) :: nodal
+      complex(wp) :: turn(model%n_dof)
+      integer :: i, place(model%n_dof), n
+
+      call tie_sector(model, k, place, turn, n)
+      associate (speed => model%cyclic%speed)
+         nodal%order = speed%order
+         if (allocated(speed%coriolis)) nodal%coriolis = tied(speed%coriolis, place, turn, n)
+         if (allocated(speed%circulatory)) nodal%circulatory = tied(speed%circulatory, place, &
+                                                                    turn, n)
+         if (allocated(speed%stiffness)) nodal%stiffness = tied(speed%stiffness, place, turn, n)
+         if (allocated(speed%damping)) nodal%damping = tied(speed%damping, place, turn, n)
+         if (allocated(speed%structural)) nodal%structural = tied(speed%structural, place, turn, n)
+         if (.not. allocated(speed%load)) return
+         allocate (nodal%load(n), source=(0.0_wp, 0.0_wp))
+         do i = 1, model%n_dof
+            nodal%load(place(i)) = nodal%load(place(i)) + conjg(turn(i))*speed%load(i)
+         end do
+      end associate
+   end subroutine speed_at
 
    !> The stiffness of the air for the waves in both directions; their matrices are not alike, but
    !> T of -k is the conjugate of T of k. Zero where the model does not say it.

@@ -6,7 +6,7 @@
 !> (a row that depends on others there, a mode kept of another nodal diameter) is padded: a spring
 !> of its own that nothing loads.
 module fw_sector_reduction
-   use fw_cyclic_data, only: nodal_matrices, speed_matrices
+   use fw_cyclic_data, only: nodal_matrices, nodal_speed
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hermitian, only: cholesky, congruence, product_of, is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
@@ -44,7 +44,7 @@ module fw_sector_reduction
       complex(wp), allocatable :: circulatory(:, :), structural(:, :)
       !> What a rotation speed that follows the frequency adds, in the coordinates: nothing is
       !> condensed then.
-      type(speed_matrices), allocatable :: speed
+      type(nodal_speed), allocatable :: speed
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       complex(wp), allocatable :: observe_q(:, :), observe_i(:, :)
       !> Coordinates that this nodal diameter does not have (n_coordinates).
@@ -231,31 +231,19 @@ contains
    end subroutine keep_dofs
 
    !> Take what follows the frequency to the coordinates; before `transform`, which forgets the
-   !> basis. Of one sector, whose basis is real.
-   subroutine take_speed(self, speed)
+   !> basis. All that are free stand in the places of all nodal diameters.
+   subroutine take_speed(self, speed, n_coordinates, slot)
       class(sector_reduction), intent(inout) :: self
-      type(speed_matrices), intent(in) :: speed
-      real(wp), allocatable :: t(:, :)
+      type(nodal_speed), intent(in) :: speed
+      integer, intent(in) :: n_coordinates
+      !> See transform.
+      integer, intent(in) :: slot(:)
+      complex(wp) :: t(size(self%t_q, 1), n_coordinates)
 
-      t = real(self%t_q, wp)
+      t = (0.0_wp, 0.0_wp)
+      t(:, slot) = self%t_q
       allocate (self%speed)
-      self%speed%order = speed%order
-      call take(speed%coriolis, self%speed%coriolis)
-      call take(speed%circulatory, self%speed%circulatory)
-      call take(speed%stiffness, self%speed%stiffness)
-      call take(speed%damping, self%speed%damping)
-      call take(speed%structural, self%speed%structural)
-      if (allocated(speed%load)) self%speed%load = matmul(speed%load, t)
-
-   contains
-
-      subroutine take(matrix, reduced)
-         real(wp), allocatable, intent(in) :: matrix(:, :)
-         real(wp), allocatable, intent(inout) :: reduced(:, :)
-
-         if (allocated(matrix)) reduced = matmul(transpose(t), matmul(matrix, t))
-      end subroutine take
-
+      self%speed = speed%in_basis(t)
    end subroutine take_speed
 
    !> Make coordinates of internal modes.

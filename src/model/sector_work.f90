@@ -46,7 +46,7 @@ contains
       if (allocated(basis%structural)) d = basis%structural
       if (point%conjugated) d = conjg(d)
       if (allocated(basis%speed)) call add_multiple(basis%speed%structural, cmplx( &
-         (omega/basis%speed%order)**2, kind=wp), d)
+         (omega/basis%speed%order)**2, kind=wp), point%conjugated, d)
       work = point%harmonic*pi*real(dot_product(u, matmul(d, u)), wp)
    end function structural_work_of
 

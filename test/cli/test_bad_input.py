@@ -361,7 +361,6 @@ def test_no_stiffness_is_no_slider(fw_run):
 @pytest.mark.parametrize("key, remedy", [
     ("harmonics%adaptive=.true.", "use harmonics%accuracy"),
     ("harmonics%adaptive_tolerance=1e-3", "use harmonics%accuracy"),
-    ("sweep%frequencies=0.5, 0.6", "use sweep%values"),
     ("sweep%first_point=3", "use sweep%start, sweep%end and sweep%n_points"),
     ("sweep%last_point=3", "use sweep%start, sweep%end and sweep%n_points"),
     ("sweep%lead_points=3", "use sweep%start, sweep%end and sweep%n_points"),
@@ -374,3 +373,18 @@ def test_a_former_key_names_the_one_to_use(fw_run, key, remedy):
     keys = fw_run("--keys").stdout
     for word in re.findall(r"\w+%(\w+)", message.partition("; ")[2]):
         assert f"   {word} = " in keys
+
+
+def test_frequencies_are_read_as_values(fw_run):
+    path = fw_run.directory / "case.nml"
+    text = re.sub(r"&sweep[^/]*/", "&sweep {} /", path.read_text(), flags=re.DOTALL)
+    shown = {}
+    for key in "values", "frequencies":
+        path.write_text(text.replace("{}", f"{key} = 0.5, 0.6"))
+        done = fw_run("-o", f"{key}.h5", "case.nml")
+        assert done.returncode == 0, done.stderr
+        with h5py.File(fw_run.directory / f"{key}.h5") as file:
+            shown[key] = file["amplitude"][()].tolist()
+    assert shown["values"] == shown["frequencies"]
+    path.write_text(text.replace("{}", "values = 0.5, 0.6 frequencies = 0.5"))
+    assert "sweep%values: keep one" in fw_run.refused("case.nml")

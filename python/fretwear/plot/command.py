@@ -142,7 +142,7 @@ def _kinds(result: Result, text: str | None) -> list[str]:
     for name in names:
         if name in TOGETHER and name not in KINDS:
             raise InputError(f"--kind {name}: is drawn of several results: name two or more, at "
-                             f"several {'speeds' if name == 'campbell' else 'loads'}")
+                             "several loads")
         if name not in KINDS:
             raise InputError(f"--kind {name}: must be among {', '.join(KINDS)}"
                              + did_you_mean(name, words=KINDS))

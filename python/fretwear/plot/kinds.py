@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ..errors import NotBuiltError
 from ..result import Result
 from .backbone import plot_backbone
+from .campbell import plot_campbell_result
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
@@ -122,6 +123,8 @@ KINDS: dict[str, Kind] = {
     "safe": Kind("Engine orders at a speed",
                  lambda r: _has_diameters(r) and rotation_speed(r) > 0.0,
                  lambda r, c: plot_safe(r, c.speed)),
+    "campbell": Kind("Campbell diagram", _has("campbell/speed"),
+                     lambda r, c: plot_campbell_result(r)),
     "mode": Kind("Nonlinear mode", _is_mode, lambda r, c: plot_mode(r)),
     "backbone": Kind("Backbone of the mode", _is_mode, lambda r, c: plot_backbone(r, c.observe)),
     "resonance": Kind("Resonance over a parameter", _is_resonance, lambda r, c: plot_resonance(r)),

@@ -1,0 +1,21 @@
+!> What a case was read from, where other cases are read from it once more with changes on top: the
+!> blocks of a mission, the engine orders of a Campbell diagram.
+module fw_case_source
+   use fw_raw_model, only: raw_model
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: case_source
+
+   type :: case_source
+      character(:), allocatable :: path
+      !> Not allocated where the path names the file.
+      character(:), allocatable :: text
+      type(string_type), allocatable :: overrides(:)
+      !> The model where the calling program gives it.
+      type(raw_model), allocatable :: model
+      logical :: tries_files = .false.
+   end type case_source
+
+end module fw_case_source

@@ -1,0 +1,445 @@
+!> Analysis 'campbell': natural frequencies over the rotation speed, the speeds at which engine
+!> orders meet them, and the maximum of the response along the order near each crossing.
+!>
+!> An engine order e excites the nodal diameter k = e modulo N, folded to (-N/2, N/2], with the
+!> frequency abs(e) Omega in the turning frame. Each order is a case of its own, a sweep whose speed
+!> follows the frequency along that order; the frequencies come from its matrices too.
+module fw_run_campbell
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
+   use fw_analysis, only: analysis, run_type
+   use fw_body, only: body_type
+   use fw_campbell_group, only: campbell_group
+   use fw_campbell_search, only: find_largest, find_root
+   use fw_case, only: case_type
+   use fw_changed_case, only: read_changed
+   use fw_error, only: error_type, status_stopped
+   use fw_frequency_response, only: new_strategy
+   use fw_kinds, only: wp
+   use fw_modes, only: mode_type
+   use fw_natural_modes, only: find_natural_modes, natural_modes
+   use fw_point, only: point_type
+   use fw_sector_modes, only: find_sector_modes
+   use fw_strategy, only: new_request, point_strategy
+   use fw_text, only: string_type, to_text
+   use fw_text_list, only: append
+   use fw_values, only: number_text
+   implicit none (type, external)
+   private
+
+   public :: campbell_analysis
+
+   !> A mode that an order meets.
+   type :: crossing_type
+      !> Which of the orders, and the mode of its nodal diameter.
+      integer :: line = 0, mode = 0
+      !> Rotation speed, and that of the same mode without contact, where it has one.
+      real(wp) :: speed = 0.0_wp, open_speed = 0.0_wp
+      real(wp) :: damping_ratio = 0.0_wp
+   end type crossing_type
+
+   !> The case along one engine order.
+   type :: line_type
+      integer :: order = 0, nodal_diameter = 0
+      class(case_type), allocatable :: case
+   end type line_type
+
+   type, extends(analysis) :: campbell_analysis
+      type(line_type), allocatable, private :: line(:)
+      type(crossing_type), allocatable, private :: crossing(:)
+      !> Frequencies of peaks that could not be solved, of how many.
+      integer, private :: n_failed = 0, n_solved = 0
+   contains
+      procedure :: start
+      procedure :: check
+   end type campbell_analysis
+
+   !> A window reaches so many half-widths to both sides of its crossings.
+   real(wp), parameter :: half_widths = 4.0_wp
+   !> Half-widths of a mode without damping, in parts of its frequency: a window needs some.
+   real(wp), parameter :: least_ratio = 1.0e-6_wp
+   !> The mode of a crossing is looked for within this part of its frequency.
+   real(wp), parameter :: near = 1.0e-3_wp
+
+contains
+
+   subroutine start(self, case, run, error)
+      class(campbell_analysis), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(out) :: error
+      type(campbell_group) :: group
+
+      call read_lines(self, case, error)
+      if (.not. allocated(error)) call find_frequencies(self, case, group, error)
+      if (.not. allocated(error)) call find_crossings(self, case, group, error)
+      if (allocated(error)) return
+      call describe_crossings(self, group)
+      if (case%campbell%peaks) then
+         call find_peaks(self, case, run, group, error)
+         ! What was found by then is a result.
+         call run%forgive_stop(error)
+         if (allocated(error)) return
+      end if
+      call run%writer%add(group, error)
+      if (allocated(error)) return
+      if (self%n_failed > 0) call run%tell('campbell points', to_text(self%n_failed)//' of '// &
+         to_text(self%n_solved)//' points near crossings could not be solved: a peak may be missed')
+      call make_table(self, group, run%table)
+   end subroutine start
+
+   !> All orders, without a solution.
+   subroutine check(self, case, error)
+      class(campbell_analysis), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      call read_lines(self, case, error)
+   end subroutine check
+
+   subroutine read_lines(self, case, error)
+      class(campbell_analysis), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(string_type), allocatable :: changes(:)
+      real(wp) :: ends(2)
+      integer :: i, n
+
+      n = max(1, case%model%cyclic%n_sectors)
+      allocate (self%line(size(case%campbell%orders)))
+      do i = 1, size(self%line)
+         associate (line => self%line(i), e => case%campbell%orders(i))
+            line%order = e
+            line%nodal_diameter = modulo(e, n)
+            if (2*line%nodal_diameter > n) line%nodal_diameter = line%nodal_diameter - n
+            ends = abs(e)*[case%campbell%start, case%campbell%end]
+            ends(1) = max(ends(1), near*ends(2))
+            allocate (changes(0))
+            call append(changes, "case%analysis='frf'")
+            if (case%model%cyclic%has_sectors()) call append(changes, 'cyclic%engine_order='// &
+                                                             to_text(e))
+            call append(changes, "sweep%unit='rad/s'")
+            call append(changes, 'sweep%start='//number_text(ends(1)))
+            call append(changes, 'sweep%end='//number_text(ends(2)))
+            call append(changes, 'sweep%n_points='//to_text(case%campbell%n_points))
+            if (case%model%turns) call append(changes, 'sweep%speed_order='//to_text(abs(e)))
+            call append(changes, 'load%harmonic_scale='//number_text( &
+                        case%model%harmonic_scale*case%campbell%scale_of(i)))
+            allocate (line%case)
+            call read_changed(case, changes, 'engine order '//to_text(e), line%case, error)
+            if (allocated(error)) return
+            deallocate (changes)
+         end associate
+      end do
+   end subroutine read_lines
+
+   !> What vibrates, at a rotation speed.
+   subroutine turn(line, speed, body)
+      type(line_type), intent(in) :: line
+      real(wp), intent(in) :: speed
+      type(body_type), intent(out) :: body
+
+      body = line%case%body_type
+      body%model = line%case%model%at_frequency(abs(line%order)*speed)
+      if (allocated(body%model%cyclic%speed)) deallocate (body%model%cyclic%speed)
+   end subroutine turn
+
+   !> Of all nodal diameters at all speeds.
+   subroutine find_frequencies(self, case, group, error)
+      class(campbell_analysis), intent(in) :: self
+      type(case_type), intent(in) :: case
+      type(campbell_group), intent(inout) :: group
+      type(error_type), allocatable, intent(out) :: error
+      type(natural_modes) :: modes
+      type(body_type) :: body
+      integer :: i, n_modes
+
+      associate (options => case%campbell)
+         group%speed = options%start + (options%end - options%start)* &
+                       [(real(i, wp)/(options%n_speeds - 1), i=0, options%n_speeds - 1)]
+         n_modes = min(case%model%cyclic%n_modes, case%model%n_dof)
+         do i = 1, options%n_speeds
+            call turn(self%line(1), group%speed(i), body)
+            ! Without speed nothing whirls, and a nodal diameter stands for both ways.
+            if (i == 1) group%nodal_diameter = diameters_of(self, group%speed(options%n_speeds))
+            call find_natural_modes(body, n_modes, modes, error, &
+                                    merge(group%nodal_diameter, abs(group%nodal_diameter), &
+                                          body%model%cyclic%splits_waves()))
+            if (allocated(error)) return
+            if (i == 1) allocate (group%open(n_modes, size(group%nodal_diameter), &
+                                             options%n_speeds))
+            if (i == 1) allocate (group%closed, mold=group%open)
+            group%open(:, :, i) = modes%open
+            group%closed(:, :, i) = modes%closed
+         end do
+      end associate
+   end subroutine find_frequencies
+
+   !> Nodal diameters that differ at a speed.
+   function diameters_of(self, speed) result(list)
+      class(campbell_analysis), intent(in) :: self
+      real(wp), intent(in) :: speed
+      integer, allocatable :: list(:)
+      type(body_type) :: body
+      integer :: k
+
+      call turn(self%line(1), speed, body)
+      associate (cyclic => body%model%cyclic)
+         if (cyclic%splits_waves()) then
+            list = [(k, k=-(cyclic%n_sectors - 1)/2, cyclic%n_sectors/2)]
+         else
+            list = [(k, k=0, cyclic%n_sectors/2)]
+         end if
+         list = pack(list, [(cyclic%holds(abs(list(k))), k=1, size(list))])
+      end associate
+   end function diameters_of
+
+   !> Speeds at which an order meets a mode, pairs closed: signs of the difference change between
+   !> neighbouring speeds.
+   subroutine find_crossings(self, case, group, error)
+      class(campbell_analysis), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(campbell_group), intent(in) :: group
+      type(error_type), allocatable, intent(out) :: error
+      type(crossing_type), allocatable :: found(:)
+      real(wp), allocatable :: speeds(:)
+      integer :: i, j, m
+
+      allocate (self%crossing(0))
+      do i = 1, size(self%line)
+         do m = 1, size(group%closed, 1)
+            call find_roots(self%line(i), m, group, .true., speeds, error)
+            if (allocated(error)) return
+            allocate (found(size(speeds)))
+            do j = 1, size(speeds)
+               found(j) = crossing_type(line=i, mode=m, speed=speeds(j), open_speed=speeds(j))
+               call find_damping(self%line(i), found(j))
+            end do
+            if (case%contact%n_pairs > 0 .and. size(found) > 0) then
+               call find_roots(self%line(i), m, group, .false., speeds, error)
+               if (allocated(error)) return
+               ! Below the lowest speed if there is none.
+               if (size(speeds) == 0) speeds = [group%speed(1)]
+               do j = 1, size(found)
+                  found(j)%open_speed = speeds(minloc(abs(speeds - found(j)%speed), dim=1))
+               end do
+            end if
+            self%crossing = [self%crossing, found]
+            deallocate (found)
+         end do
+      end do
+   end subroutine find_crossings
+
+   !> Where a mode of the nodal diameter of an order has its frequency.
+   subroutine find_roots(line, mode, group, closed, speeds, error)
+      type(line_type), intent(in) :: line
+      integer, intent(in) :: mode
+      type(campbell_group), intent(in) :: group
+      logical, intent(in) :: closed
+      real(wp), allocatable, intent(out) :: speeds(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: difference(:)
+      real(wp) :: speed, value
+      integer :: i, place
+
+      allocate (speeds(0))
+      place = findloc(group%nodal_diameter, line%nodal_diameter, dim=1)
+      if (place == 0) place = findloc(group%nodal_diameter, abs(line%nodal_diameter), dim=1)
+      if (place == 0) return
+      if (closed) then
+         difference = group%closed(mode, place, :) - abs(line%order)*group%speed
+      else
+         difference = group%open(mode, place, :) - abs(line%order)*group%speed
+      end if
+      do i = 1, size(difference) - 1
+         if (ieee_is_nan(difference(i)) .or. ieee_is_nan(difference(i + 1))) cycle
+         if (.not. difference(i)*difference(i + 1) <= 0.0_wp) cycle
+         ! On the last speed of an interval: it is on the first of the next, if there is one.
+         if (.not. abs(difference(i + 1)) > 0.0_wp .and. i < size(difference) - 1) cycle
+         call find_root(difference_at, group%speed(i:i + 1), difference(i:i + 1), speed, error)
+         if (.not. allocated(error)) call difference_at(speed, value, error)
+         if (allocated(error)) return
+         ! Where a mode comes or goes those above it change their numbers, and meet nothing.
+         if (abs(value) <= near*abs(line%order)*speed) speeds = [speeds, speed]
+      end do
+
+   contains
+
+      subroutine difference_at(x, value, failure)
+         real(wp), intent(in) :: x
+         real(wp), intent(out) :: value
+         type(error_type), allocatable, intent(out) :: failure
+         type(natural_modes) :: modes
+         type(body_type) :: body
+         integer :: k
+
+         value = 0.0_wp
+         call turn(line, x, body)
+         k = line%nodal_diameter
+         if (.not. body%model%cyclic%splits_waves()) k = abs(k)
+         call find_natural_modes(body, mode, modes, failure, [k])
+         if (allocated(failure)) return
+         if (closed) then
+            value = modes%closed(mode, 1) - abs(line%order)*x
+         else
+            value = modes%open(mode, 1) - abs(line%order)*x
+         end if
+      end subroutine difference_at
+
+   end subroutine find_roots
+
+   !> Of the mode with its pairs closed.
+   subroutine find_damping(line, crossing)
+      type(line_type), intent(in) :: line
+      type(crossing_type), intent(inout) :: crossing
+      type(mode_type), allocatable :: modes(:)
+      type(body_type) :: body
+      real(wp) :: omega
+      integer :: k
+
+      omega = abs(line%order)*crossing%speed
+      call turn(line, crossing%speed, body)
+      call find_sector_modes(body, 1, 1, omega*[1.0_wp - near, 1.0_wp + near], modes)
+      crossing%damping_ratio = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (size(modes) == 0) return
+      k = minloc(abs(modes%omega - omega), dim=1)
+      crossing%damping_ratio = 0.5_wp*modes(k)%width/modes(k)%omega
+   end subroutine find_damping
+
+   subroutine describe_crossings(self, group)
+      class(campbell_analysis), intent(in) :: self
+      type(campbell_group), intent(inout) :: group
+
+      associate (c => self%crossing)
+         group%order = self%line(c%line)%order
+         group%diameter = self%line(c%line)%nodal_diameter
+         group%mode = c%mode
+         group%crossing_speed = c%speed
+         group%crossing_omega = abs(group%order)*c%speed
+         group%damping_ratio = c%damping_ratio
+      end associate
+   end subroutine describe_crossings
+
+   !> The largest first harmonic of the first observed quantity inside of each window.
+   subroutine find_peaks(self, case, run, group, error)
+      class(campbell_analysis), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(run_type), intent(inout), target :: run
+      type(campbell_group), intent(inout) :: group
+      type(error_type), allocatable, intent(out) :: error
+      class(point_strategy), allocatable, target :: strategy
+      integer :: i, line
+
+      associate (n => size(self%crossing))
+         allocate (group%peak_omega(n), group%peak_amplitude(case%model%n_observed(), n))
+      end associate
+      group%peak_omega = ieee_value(1.0_wp, ieee_quiet_nan)
+      group%peak_amplitude = ieee_value(1.0_wp, ieee_quiet_nan)
+      group%peak_speed = group%peak_omega
+      line = 0
+      do i = 1, size(self%crossing)
+         associate (c => self%crossing(i))
+            if (c%line /= line) then
+               line = c%line
+               if (allocated(strategy)) deallocate (strategy)
+               call new_strategy(self%line(line)%case, strategy)
+               call strategy%start(self%line(line)%case, error)
+               if (allocated(error)) return
+            end if
+            call find_peak(self, c, run, strategy, group%peak_omega(i), &
+                           group%peak_amplitude(:, i), error)
+            group%peak_speed(i) = group%peak_omega(i)/abs(self%line(line)%order)
+            if (allocated(error)) return
+         end associate
+      end do
+   end subroutine find_peaks
+
+   !> Frequencies across the window, and between the neighbours of the highest one its maximum.
+   subroutine find_peak(self, crossing, run, strategy, omega, amplitude, error)
+      class(campbell_analysis), intent(inout), target :: self
+      type(crossing_type), intent(in) :: crossing
+      type(run_type), intent(inout), target :: run
+      class(point_strategy), intent(inout), target :: strategy
+      !> NaN where there is no maximum inside.
+      real(wp), intent(inout) :: omega, amplitude(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: at(:), height(:), trial(:)
+      real(wp) :: window(2), width
+      integer :: i, k, n
+
+      associate (line => self%line(crossing%line))
+         if (size(amplitude) == 0) return
+         n = line%case%sweep%n_points
+         window = abs(line%order)*[min(crossing%speed, crossing%open_speed), &
+                                   max(crossing%speed, crossing%open_speed)]
+         width = max(merge(0.0_wp, crossing%damping_ratio, ieee_is_nan(crossing%damping_ratio)), &
+                     least_ratio)*abs(line%order)*crossing%speed
+         window = window + half_widths*width*[-1.0_wp, 1.0_wp]
+         window(1) = max(window(1), near*window(2))
+         at = window(1) + (window(2) - window(1))*[(real(i, wp)/(n - 1), i=0, n - 1)]
+         allocate (height(n), trial(size(amplitude)))
+         do i = 1, n
+            call height_at(at(i), height(i), error)
+            if (allocated(error)) return
+         end do
+         k = maxloc(height, dim=1)
+         if (k == 1 .or. k == n .or. .not. height(k) > 0.0_wp) return
+         call find_largest(height_at, at(k - 1:k + 1), height(k), omega, error)
+         if (allocated(error)) return
+         call height_at(omega, width, error)
+         if (.not. allocated(error)) amplitude = trial
+      end associate
+
+   contains
+
+      !> Below 0 where it could not be solved.
+      subroutine height_at(x, value, failure)
+         real(wp), intent(in) :: x
+         real(wp), intent(out) :: value
+         type(error_type), allocatable, intent(out) :: failure
+         type(point_type) :: point
+
+         value = -1.0_wp
+         associate (case => self%line(crossing%line)%case)
+            call strategy%solve_in_time(case, new_request(case, x, run%observer), point, failure)
+         end associate
+         if (allocated(failure)) return
+         self%n_solved = self%n_solved + 1
+         if (.not. point%converged) then
+            self%n_failed = self%n_failed + 1
+            return
+         end if
+         trial = norm2(point%coefficients(2:3, :), dim=1)
+         value = trial(1)
+      end subroutine height_at
+
+   end subroutine find_peak
+
+   !> A line for each crossing.
+   subroutine make_table(self, group, table)
+      class(campbell_analysis), intent(in) :: self
+      type(campbell_group), intent(in) :: group
+      type(string_type), allocatable, intent(out) :: table(:)
+      character(120) :: line
+      integer :: i
+
+      allocate (table(0))
+      call append(table, '  order  diameter  mode   speed [rad/s]   omega [rad/s]   '// &
+                  'damping ratio   peak at         amplitude')
+      do i = 1, size(self%crossing)
+         write (line, '(i7, i10, i6, 2es16.6, es16.3)') group%order(i), group%diameter(i), &
+            group%mode(i), group%crossing_speed(i), group%crossing_omega(i), &
+            group%damping_ratio(i)
+         if (allocated(group%peak_omega)) then
+            if (ieee_is_nan(group%peak_omega(i))) then
+               line = trim(line)//'   no maximum'
+            else
+               write (line(len_trim(line) + 1:), '(es14.6, es16.6)') group%peak_omega(i), &
+                  group%peak_amplitude(1, i)
+            end if
+         end if
+         call append(table, trim(line))
+      end do
+      if (size(self%crossing) == 0) call append(table, '  no order meets a frequency')
+   end subroutine make_table
+
+end module fw_run_campbell

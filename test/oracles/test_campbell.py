@@ -1,0 +1,125 @@
+"""Speed that follows the frequency along an engine order, and the Campbell diagram.
+
+test/reference/blades/b5_speed.json is a sector with Coriolis forces, stiffening and loads that grow
+with the speed, by a dense harmonic balance of other origin.
+"""
+import json
+
+import h5py
+import numpy as np
+import pytest
+from cases import run
+from project import ROOT
+from test_stress_cycle import with_model, write_model
+
+REFERENCE = json.loads((ROOT / "test/reference/blades/b5_speed.json").read_text())
+
+
+def differences(path, expect):
+    """Largest difference of each dataset, over its limit times its largest value."""
+    with h5py.File(path) as file:
+        for row in expect:
+            values = np.array(row["value"], dtype=float)
+            error = np.abs(file[row["dataset"]][()] - values).max()
+            limit = row["limit"] * np.abs(values).max()
+            yield row["dataset"], error, limit
+
+
+@pytest.mark.parametrize("number", range(len(REFERENCE["runs"])))
+def test_along_an_order(tmp_path, number):
+    write_model(tmp_path / "model.h5", REFERENCE["file"])
+    wanted = REFERENCE["runs"][number]
+    run(tmp_path, with_model(wanted["case"]))
+    for name, error, limit in differences(tmp_path / "case.h5", wanted["expect"]):
+        assert error <= limit, name
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_row_of_an_order_line_is_a_point_of_that_speed(tmp_path, number):
+    write_model(tmp_path / "model.h5", REFERENCE["file"])
+    case = with_model(REFERENCE["runs"][number]["case"])
+    run(tmp_path, case)
+    with h5py.File(tmp_path / "case.h5") as file:
+        rows, speeds = file["coefficients"][()], file["speed"][()]
+    order = case["sweep"]["speed_order"]
+    for k, omega in enumerate(case["sweep"]["frequencies"]):
+        assert speeds[k] == pytest.approx(omega / order, rel=1e-14)
+        fixed = {**case, "case": {"analysis": "point"}, "sweep": {"start": omega},
+                 "model": {**case["model"], "rotation_speed": omega / order}}
+        run(tmp_path, fixed)
+        with h5py.File(tmp_path / "case.h5") as file:
+            point = file["coefficients"][0]
+        assert np.abs(rows[k] - point).max() <= 1e-10 * np.abs(point).max()
+
+
+def small_sector(path, **others):
+    """Six sectors of two masses with stiffening and Coriolis forces."""
+    write_model(path, {
+        "mass": np.diag([1.0, 0.4, 1.0]) + 0.0, "stiffness":
+        [[3.0, -1.0, -0.5], [-1.0, 1.6, 0.0], [-0.5, 0.0, 1.0]],
+        "damping": 0.01 * np.eye(3), "stiffness_rotation": np.diag([0.1, 0.3, 0.1]),
+        "coriolis": [[0.0, 0.4, 0.0], [-0.4, 0.0, 0.0], [0.0, 0.0, 0.0]],
+        "load/cosine": [0.0, 1.0, 0.0],
+        "cyclic@n_sectors": 6, "cyclic/left": np.array([1], dtype=np.int32),
+        "cyclic/right": np.array([3], dtype=np.int32)} | others)
+
+
+DIAGRAM = {"case": {"analysis": "campbell"}, "harmonics": {"n_harmonics": 1},
+           "cyclic": {"n_modes": 2}, "output": {"observe": 2},
+           "campbell": {"start": 0.05, "end": 1.5, "n_speeds": 7, "orders": [2, -1, 5, 8]}}
+
+
+def test_frequencies_are_those_of_modes_at_each_speed(tmp_path):
+    small_sector(tmp_path / "model.h5")
+    run(tmp_path, with_model(DIAGRAM))
+    with h5py.File(tmp_path / "case.h5") as file:
+        diagram = {name: file["campbell"][name][()] for name in ("speed", "open", "closed",
+                                                                  "nodal_diameter")}
+        crossing = {name: file["campbell/crossing"][name][()] for name in file["campbell/crossing"]}
+    for k, speed in enumerate(diagram["speed"]):
+        run(tmp_path, with_model({"case": {"analysis": "modes"}, "cyclic": {"n_modes": 2},
+                                  "model": {"rotation_speed": speed}}))
+        with h5py.File(tmp_path / "case.h5") as file:
+            assert file["modes/nodal_diameter"][()].tolist() == diagram["nodal_diameter"].tolist()
+            for state in "open", "closed":
+                assert diagram[state][k] == pytest.approx(file[f"modes/{state}"][()], rel=1e-12)
+    # Orders 2 and 8 excite the same nodal diameter.
+    assert set(zip(crossing["order"], crossing["nodal_diameter"], strict=True)) <= {
+        (2, 2), (-1, -1), (5, -1), (8, 2)}
+    for order, diameter, mode, speed in zip(*(crossing[name] for name in (
+            "order", "nodal_diameter", "mode", "speed")), strict=True):
+        run(tmp_path, with_model({"case": {"analysis": "modes"}, "cyclic": {"n_modes": 2},
+                                  "model": {"rotation_speed": speed}}))
+        with h5py.File(tmp_path / "case.h5") as file:
+            place = file["modes/nodal_diameter"][()].tolist().index(diameter)
+            omega = file["modes/closed"][place, mode - 1]
+        assert omega == pytest.approx(abs(order) * speed, rel=1e-10)
+
+
+def test_loads_of_orders_are_scaled(tmp_path):
+    small_sector(tmp_path / "model.h5")
+    heights = []
+    for scale in 1.0, [1.0, 2.0, 0.5, 3.0]:
+        run(tmp_path, with_model({**DIAGRAM, "campbell": {**DIAGRAM["campbell"],
+                                                          "order_scale": scale}}))
+        with h5py.File(tmp_path / "case.h5") as file:
+            heights.append(file["campbell/peak/amplitude"][:, 0])
+            factor = np.array([[1.0, 2.0, 0.5, 3.0][[2, -1, 5, 8].index(order)]
+                               for order in file["campbell/crossing/order"]])
+    assert np.isfinite(heights[0]).all()
+    assert heights[1] == pytest.approx(factor * heights[0], rel=1e-7)
+
+
+@pytest.mark.parametrize("change, words", [
+    ({"campbell": {"orders": [2, 0]}}, "engine orders other than 0"),
+    ({"campbell": {"end": 0.01}}, "must be above start"),
+    ({"campbell": {"order_scale": [1.0, 2.0]}}, "one for each of the 4 orders"),
+    ({"model": {"rotation_speed": 1.0}}, "give campbell%start and end"),
+    ({"cyclic": {"mistuned": True, "n_modes": 2}}, "leave mistuned out")])
+def test_what_does_not_go_together_is_refused(tmp_path, change, words):
+    small_sector(tmp_path / "model.h5")
+    case = with_model(DIAGRAM)
+    for group, keys in change.items():
+        case[group] = {**case.get(group, {}), **keys}
+    done = run(tmp_path, case, status=3)
+    assert words in done.stderr
