@@ -13,7 +13,14 @@ import h5py
 import numpy as np
 import pytest
 from project import EXAMPLE
-from test_pieces import DUFFING, OF_THE_WAY, SAME, SLIDING, assert_same_result
+from test_pieces import (
+    DUFFING,
+    OF_THE_WAY,
+    SAME,
+    SLIDING,
+    assert_same_result,
+    random_chain,
+)
 
 import fretwear as fw
 from fretwear import _pool
@@ -267,3 +274,20 @@ def test_a_part_that_is_there_is_not_solved_again(tmp_path: Path,
     target.write_bytes(target.read_bytes()[:1000])
     run_share(case, Share(1, 1, 2), target)
     assert len(solved) == 3
+
+
+def test_random_sweeps_go_on(tmp_path: Path) -> None:
+    """Chains that rub, up or down, left at any row."""
+    rng = np.random.default_rng(21)
+    for _ in range(8):
+        case = random_chain(rng)
+        left = tmp_path / "left.h5"
+        whole = fw.run(case, tmp_path / "whole.h5", check=False)
+        with h5py.File(tmp_path / "whole.h5") as file, h5py.File(left, "w") as kept:
+            keep_rows(file, kept, int(rng.integers(1, whole.n_points)))
+        again = fw.run(case, in_memory=True, check=False, restart=left,
+                       workers=int(rng.integers(1, 3)))
+        assert (whole.converged == again.converged).all()
+        solved = whole.converged.astype(bool)
+        assert np.allclose(whole.coefficients[solved], again.coefficients[solved], rtol=0.0,
+                           atol=1e-5 * np.abs(whole.coefficients).max())
