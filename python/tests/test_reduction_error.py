@@ -104,3 +104,39 @@ def test_the_command_keeps_what_it_reached(tmp_path: Path) -> None:
                            (("--reduce", "5", "--verify"), "--verify needs --up-to HZ")):
         done = run_import(tmp_path, *options)
         assert done.returncode == 3 and words in done.stderr, done.stderr
+
+
+def random_bodies(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stiffness, mass and rows of two nets of springs, held at one end each, with a few pairs."""
+    sizes = rng.integers(30, 80, 2)
+    n, n_pairs = int(sizes.sum()), int(rng.integers(1, 6))
+    stiffness = np.zeros((n, n))
+    for first, size in ((0, sizes[0]), (sizes[0], sizes[1])):
+        ends = [(k, k + 1) for k in range(size - 1)]
+        ends += [tuple(rng.choice(size, 2, replace=False)) for _ in range(size // 3)]
+        for i, j in ends:
+            both = [first + i, first + j]
+            stiffness[np.ix_(both, both)] += rng.uniform(0.1, 2.0) * np.array([[1, -1], [-1, 1]])
+    stiffness[0, 0] += 1.0
+    stiffness[-1, -1] += 1.0
+    rows = np.zeros((n_pairs, n))
+    pairs = np.arange(n_pairs)
+    rows[pairs, rng.permutation(sizes[0])[:n_pairs]] = 1.0
+    rows[pairs, sizes[0] + rng.permutation(sizes[1])[:n_pairs]] = -1.0
+    return stiffness, np.diag(rng.uniform(0.5, 2.0, n)), rows
+
+
+def test_estimates_of_random_models_are_near_their_errors() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        stiffness, mass, rows = random_bodies(rng)
+        n_modes, n_rows = int(rng.integers(5, 20)), len(rows)
+        system = reduce(mass, stiffness, rows, n_modes=n_modes + 1, factor="superlu")
+        found = system.reduction
+        frequency = found.omega[n_modes] / rng.uniform(1.4, 5.0)
+        ours = error_of_modes(found.bonded, sp.csr_array(mass), found.omega, found.shapes,
+                              frequency)[-1]
+        kept = np.ix_(*[np.arange(n_rows + n_modes)] * 2)
+        exact = true_error(system.mass[kept], system.stiffness[kept], sp.csr_array(mass),
+                           sp.csr_array(stiffness), sp.csr_array(rows), frequency)
+        assert exact / FACTOR < ours < exact * FACTOR
