@@ -12,10 +12,10 @@ set -euo pipefail
 venv=$1
 for_what=${2:-all}
 run_packages=(numpy h5py matplotlib)
-python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
-                pint selenium pytest xdist gcovr nbclient ipykernel threadpoolctl mypy ruff
+python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pymetis pyarrow distributed bokeh
+                tqdm pint selenium pytest xdist gcovr nbclient ipykernel threadpoolctl mypy ruff
                 fortitude ford sphinx numpydoc myst_parser fpm)
-python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed
+python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pymetis pyarrow distributed
                  bokeh tqdm pint selenium pytest pytest-xdist gcovr nbclient ipykernel
                  threadpoolctl mypy ruff fortitude-lint ford sphinx numpydoc myst-parser fpm)
 if [ "$for_what" = run ]; then

@@ -1,12 +1,12 @@
 """Time and memory of bringing a finite-element model in: matrices of 10,000 to 100,000 dofs, read
-and reduced to pairs and modes by `fretwear import`.
+and reduced to pairs and modes by `fretwear import`, with each engine that is there.
 
-    python -m bench.speed.imports [--most 100000]
+    python -m bench.speed.imports [--most 1000] [--engines superlu cholmod]
 
 The models are blade sectors of `fretwear.sector` with finer meshes; their matrices are written as
 Matrix Market files, as other programs hand them over, and the pairs as rows of averages over
-patches. Wall times of the whole command. Writes the table between its marks in
-docs/benchmarks/imports.md.
+patches. Times of the processor and memory of the whole command. Writes the table between its marks
+in docs/benchmarks/imports.md.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,8 @@ import scipy.io as sio
 import scipy.sparse as sp
 
 from bench.common.sector import COARSE
+from fretwear.errors import InputError
+from fretwear.factors import chosen_engine
 from fretwear.sector.assembly import Assembly
 from fretwear.sector.contact import contact_rows, held_nodes
 from fretwear.sector.mesh import build_mesh
@@ -40,16 +44,17 @@ SIZES: tuple[tuple[int, dict[str, int]], ...] = (
     (384, {key.replace("-", "_"): value for key, value in COARSE.items()}),
     (1000, {"blade_columns": 4, "airfoil_rows": 8, "disk_rows": 4}))
 N_MODES = 20
+ENGINES = ("superlu", "cholmod", "mumps")
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of an import: dofs, pairs, entries of the stiffness, files [MB], seconds, memory [MB]."""
+    """Of an import: dofs, pairs, entries of the stiffness, who factored, seconds, memory [MB]."""
 
     dofs: int
     pairs: int
     entries: int
-    size: float
+    engine: str
     seconds: float
     memory: float
 
@@ -75,31 +80,41 @@ def write_model(folder: Path, pairs: int, mesh: dict[str, Any]) -> tuple[int, in
     return len(free), stiffness.nnz
 
 
-def measure(pairs: int, mesh: dict[str, Any]) -> Cost:
-    """One import, as a user types it."""
+def measure(pairs: int, mesh: dict[str, Any], engines: Sequence[str]) -> Iterator[Cost]:
+    """An import with each engine, as a user types it."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        dofs, entries = write_model(folder, pairs, mesh)
-        size = sum(file.stat().st_size for file in folder.iterdir()) / 1e6
-        started = time.perf_counter()
-        process = subprocess.Popen(
-            [sys.executable, "-m", "fretwear", "import", "--stiffness", "stiffness.mtx",
-             "--mass", "mass.mtx", "--pairs", "pairs.csv", "--contact-rows", "rows.mtx",
-             "--reduce", str(N_MODES), "-q", "-o", "model.h5"], cwd=folder,
-            env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            raise RuntimeError(f"fretwear import ended with status {process.returncode}")
-        return Cost(dofs, pairs, entries, size, time.perf_counter() - started,
-                    used.ru_maxrss / 1024.0)
+        # By another process: the memory of this one would count as that of those it begins.
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+            dofs, entries = pool.submit(write_model, folder, pairs, mesh).result()
+        for engine in engines:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "fretwear", "import", "--stiffness", "stiffness.mtx",
+                 "--mass", "mass.mtx", "--pairs", "pairs.csv", "--contact-rows", "rows.mtx",
+                 "--reduce", str(N_MODES), "--factor", engine, "-q", "-o", "model.h5"],
+                cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
+            _, status, used = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            if process.returncode:
+                raise RuntimeError(f"fretwear import ended with status {process.returncode}")
+            yield Cost(dofs, pairs, entries, engine, used.ru_utime + used.ru_stime,
+                       used.ru_maxrss / 1024.0)
+
+
+def is_there(engine: str) -> bool:
+    """Whether it is installed."""
+    try:
+        chosen_engine(engine)
+    except InputError:
+        return False
+    return True
 
 
 def table(costs: list[Cost]) -> str:
     """The costs in Markdown."""
-    lines = ["| dofs | pairs | entries of the stiffness | files [MB] | seconds | memory [MB] |",
+    lines = ["| dofs | pairs | entries of the stiffness | factors | seconds | memory [MB] |",
              "|---|---|---|---|---|---|"]
-    lines += [f"| {cost.dofs} | {cost.pairs} | {cost.entries} | {cost.size:.0f} | "
+    lines += [f"| {cost.dofs} | {cost.pairs} | {cost.entries} | {cost.engine} | "
               f"{cost.seconds:.0f} | {cost.memory:.0f} |" for cost in costs]
     return "\n".join(lines)
 
@@ -107,13 +122,16 @@ def table(costs: list[Cost]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--most", type=int, default=1000, help="pairs of the largest model")
+    parser.add_argument("--engines", nargs="+", choices=ENGINES, default=ENGINES)
     parser.add_argument("--page", type=Path, default=PAGE)
     arguments = parser.parse_args()
+    engines = [engine for engine in arguments.engines if is_there(engine)]
     costs = []
     for pairs, mesh in SIZES:
         if pairs <= arguments.most:
-            costs.append(measure(pairs, mesh))
-            print(table(costs), flush=True)
+            for cost in measure(pairs, mesh, engines):
+                costs.append(cost)
+                print(table(costs), flush=True)
     before, rest = arguments.page.read_text().split(BEGIN)
     arguments.page.write_text(f"{before}{BEGIN}\n\n{table(costs)}\n\n{END}{rest.split(END)[1]}")
 

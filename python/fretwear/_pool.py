@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 import os
 import threading
@@ -12,7 +13,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Callable, TypeVar
 
 from ._watching import StopFlag
-from .errors import InputError
+from .errors import FretwearError, InputError
 
 __all__ = ["HERE", "Pool", "Tick", "core_count", "open_pool"]
 
@@ -25,6 +26,8 @@ _Answer = TypeVar("_Answer")
 #: Called now and then; what is true ends the work.
 Tick = Callable[[], object]
 
+#: A cluster without a worker for so long [s] is refused.
+_WAIT_FOR_WORKERS = 30.0
 #: Time between two calls of a tick, and after which Ctrl-C is seen [s].
 _BETWEEN_TICKS = 0.1
 
@@ -118,9 +121,22 @@ class _Cluster(Pool):
         try:
             for future in _as_they_end(futures, tick, threading.Event()):
                 if not future.cancelled():
-                    yield future.result()
+                    yield _answer_of(future)
         finally:
             self._client.cancel(futures)
+
+
+def _answer_of(future: Any) -> Any:
+    """What a worker has answered; says in words that workers have died of it."""
+    try:
+        return future.result()
+    except Exception as error:
+        if type(error).__name__ != "KilledWorker":
+            raise
+        raise FretwearError(
+            "workers of the cluster were ended while they solved a piece, and it was given up: "
+            f"{error}. A likely cause is memory: give each worker more (--memory-limit of dask "
+            "worker, or fewer workers on a machine)") from None
 
 
 @contextmanager
@@ -131,7 +147,7 @@ def open_pool(scheduler: str, workers: int, said_by: str = "scheduler") -> Itera
     ----------
     scheduler : str
         'threads' (or 'processes', which a thread each waits for), 'dask' for a cluster on this
-        machine, or the address of a Dask scheduler.
+        machine, the address of a Dask scheduler, or its scheduler file (.json).
     workers : int
         Pieces at once on this machine; 0: one for each core, or thread of the cluster.
     said_by : str, optional
@@ -140,25 +156,34 @@ def open_pool(scheduler: str, workers: int, said_by: str = "scheduler") -> Itera
     Raises
     ------
     InputError
-        Dask is not installed, or nothing answers, or the package is not there.
+        Dask is not installed, or nothing answers, or there is no worker or no package there.
     """
     if scheduler in HERE:
         yield Pool(workers or core_count())
         return
     distributed = _distributed(said_by)
+    if scheduler.endswith(".json") and not os.path.isfile(scheduler):
+        # Dask would wait for it without a word.
+        raise InputError(f"{said_by} = '{scheduler}': there is no such scheduler file; dask "
+                         "scheduler --scheduler-file writes it")
     local = scheduler == "dask"
     cluster = None
     try:
         if local:
             cluster = distributed.LocalCluster(n_workers=workers or core_count(),
                                                threads_per_worker=1, dashboard_address=None)
-        client = distributed.Client(cluster if local else scheduler)
+        client = (distributed.Client(scheduler_file=scheduler) if scheduler.endswith(".json")
+                  else distributed.Client(cluster if local else scheduler))
     except (OSError, ValueError) as error:
         raise InputError(f"{said_by} = '{scheduler}': no Dask scheduler answers there: {error}"
                          ) from None
     try:
         if not local:
-            _require_package(client, f"{said_by} = '{scheduler}'")
+            said = f"{said_by} = '{scheduler}'"
+            _require_package(client, said)
+            if not client.nthreads():
+                _require_worker(client, said)
+                _require_package(client, said)
         yield _Cluster(client, workers or max(sum(client.nthreads().values()), 1))
     finally:
         client.close()
@@ -178,6 +203,17 @@ def _require_package(client: Any, said: str) -> None:
     if lacking:
         raise InputError(f"{said}: {', '.join(lacking)} cannot import fretwear: install it there, "
                          "in the same version as here")
+
+
+def _require_worker(client: Any, said: str) -> None:
+    """A scheduler without workers takes work, and never does it."""
+    try:
+        client.wait_for_workers(1, timeout=_WAIT_FOR_WORKERS)
+    except Exception as error:
+        if not isinstance(error, (TimeoutError, asyncio.TimeoutError)):
+            raise
+        raise InputError(f"{said}: the scheduler has no workers, and none came within "
+                         f"{_WAIT_FOR_WORKERS:.0f} s: start some (dask worker ADDRESS)") from None
 
 
 def _distributed(said_by: str) -> Any:

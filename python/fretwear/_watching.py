@@ -99,9 +99,9 @@ def teller(progress: Progress | None, session: Session) -> Iterator[Tell | None]
         yield None
 
 
-def run_watched(session: Session, progress: Tell | None, stop: Callable[[], object] | None, *,
-                in_memory: bool) -> tuple[int, bool]:
-    """Run a session so that it can be interrupted; its status, and whether it was.
+def run_watched(run: Callable[[NDArray[np.int64]], int], progress: Tell | None,
+                stop: Callable[[], object] | None) -> tuple[int, bool]:
+    """Run what takes a control so that it can be interrupted; its status, and whether it was.
 
     The main thread alone gets signals, and only while it runs Python: the library works in another
     thread, while this one waits.
@@ -109,14 +109,13 @@ def run_watched(session: Session, progress: Tell | None, stop: Callable[[], obje
     control = np.zeros(CONTROL, dtype=np.int64)
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main and progress is None and stop is None:
-        return session.run(control, in_memory=in_memory), False
+        return run(control), False
     flag = getattr(stop, "__self__", None)
     if not in_main and progress is None and isinstance(flag, StopFlag):
         with flag.reaching(control):
-            return session.run(control, in_memory=in_memory), False
+            return run(control), False
     status: list[int] = []
-    worker = threading.Thread(
-        target=lambda: status.append(session.run(control, in_memory=in_memory)), name="fretwear")
+    worker = threading.Thread(target=lambda: status.append(run(control)), name="fretwear")
     with stops_on_interrupt(control, in_main) as interrupted:
         worker.start()
         try:

@@ -32,7 +32,8 @@ __all__ = ["frf", "mode", "resonance", "run", "wear"]
 def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool = True,
         progress: Progress | None = None, stop: Stop | None = None,
         max_seconds: float | None = None, in_memory: bool = False,
-        workers: int | None = None, scheduler: str = "threads") -> Result:
+        workers: int | None = None, scheduler: str = "threads",
+        restart: str | Path | None = None) -> Result:
     """Run a case and open its result.
 
     The library computes in this process with the interpreter lock released; the numbers are those
@@ -64,7 +65,11 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         the same rows to the tolerance, checked where pieces overlap (0: one for each core).
     scheduler : str, optional
         Who solves them: 'threads' of this process (default), 'dask' for a cluster on this machine,
-        or the address of a Dask scheduler, with one piece for each of its threads by default.
+        the address of a Dask scheduler, or its scheduler file (.json), with one piece for each of
+        its threads by default.
+    restart : str or Path, optional
+        Go on with a natural sweep: take the rows of this result of the same case, also of what a
+        run left that was killed (`name.h5.part`), and solve what is missing.
 
     Returns
     -------
@@ -97,11 +102,13 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     if in_memory and file is not None:
         raise InputError(f"file: is '{file}', but in_memory is set; one of the two")
     in_memory = in_memory or not case.names_output
-    if workers is not None or scheduler != "threads":
+    if workers is not None or scheduler != "threads" or restart is not None:
         from .pieces import run_in_pieces
 
-        result, report = run_in_pieces(case, workers or 0, scheduler, progress, is_stopped,
-                                       in_memory=in_memory)
+        if workers is None:
+            workers = 1 if scheduler == "threads" else 0
+        result, report = run_in_pieces(case, workers, scheduler, progress, is_stopped,
+                                       in_memory=in_memory, restart=restart)
         if check and result.status == "not converged":
             raise ConvergenceError(_failure(result, report), result, report)
         return result
@@ -112,7 +119,8 @@ def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object]
          check: bool, in_memory: bool) -> Result:
     with case.open() as session:
         with teller(progress, session) as tell:
-            status, interrupted = run_watched(session, tell, is_stopped, in_memory=in_memory)
+            status, interrupted = run_watched(
+                lambda control: session.run(control, in_memory=in_memory), tell, is_stopped)
         report = (session.text("remarks") + session.text("summary")).splitlines()
         message, path = session.text("message"), session.text("output")
         image = session.image() if in_memory else None

@@ -140,6 +140,11 @@ class Case:
         return self._model
 
     @property
+    def path(self) -> Path:
+        """Where its namelist comes from; it need not exist."""
+        return Path(os.path.abspath(self._path))
+
+    @property
     def names_output(self) -> bool:
         """Whether the result file has a place: one that was set, or one beside a namelist."""
         return bool(self._text) or any(key == "output%file" for key, _ in self._overrides)

@@ -27,6 +27,7 @@ _BROKEN_PIPE = 141
 #: Subcommand: module below `fretwear`, and what it does.
 COMMANDS = {
     "run": ("run_command", "a run of a case, of a sweep by many workers if wanted"),
+    "join": ("join_command", "one result of the pieces of a sweep"),
     "modes": ("modes_command", "natural frequencies, free and stuck, beside the sweep"),
     "plot": ("plot", "pictures of a result file"),
     "compare": ("compare", "two result files beside each other"),

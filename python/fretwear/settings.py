@@ -30,6 +30,7 @@ UNITS: dict[str, str] = {
     "model%damping_unsymmetric": "F s/L",
     "model%rayleigh_mass": "1/s",
     "model%rayleigh_stiffness": "s",
+    "model%modal_damping_up_to": "Hz",
     "model%rotation_speed": "rad/s",
     "contact%overclosure": "L",
     "contact%force": "F",
@@ -174,6 +175,9 @@ class Structure(TypedDict, total=False):
     rayleigh_stiffness: float
     #: fraction of critical damping of every mode with open contact (default: 0)
     modal_damping: float
+    #: [Hz] of modes up to this frequency alone, which takes less time; 0: of all; only:
+    #: modal_damping (default: 0)
+    modal_damping_up_to: float
     #: [rad/s] adds its square times stiffness_rotation and load/static_rotation of the model file,
     #: and its multiple of coriolis and circulatory (default: 0)
     rotation_speed: float

@@ -108,8 +108,9 @@ def test_the_package_knows_every_part(tmp_path: Path) -> None:
         make().save(tmp_path / f"{number}.h5")
         written |= names_in(tmp_path / f"{number}.h5")
     assert written <= set(parts)
-    # By other programs: dof numbers for rows, the other sign, what generators and meshes say.
-    others = {"observe/dof", "cyclic@phase", "@parameters", "@disk_parameters"}
+    # By other programs: dof numbers for rows, the other sign, what generators and imports say.
+    others = {"observe/dof", "cyclic@phase", "@parameters", "@disk_parameters",
+              "reduction/frequency", "reduction/error"}
     assert {name for name in parts if not name.startswith("mesh/")} - written == others
     given = {f"contact/{name}" for name in _IN_NAMELIST} | {*_CONTACT, *_LOADS}
     given |= {f"spring/{name}" for name in _SPRING}

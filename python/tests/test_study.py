@@ -291,6 +291,22 @@ def test_dask_cluster_on_this_machine(study: Study) -> None:
         assert np.array_equal(column, on_dask[name], equal_nan=column.dtype.kind == "f"), name
 
 
+def test_parts_of_a_study_and_their_table(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
+    """What a batch array runs, one part each; repeated, a part runs nothing."""
+    study.write(GRID.format(table="study.h5"))
+    assert study("--part", "1/4") == 0
+    first = study.results()
+    assert len(first) == 2 and not (study.folder / "study.h5").exists()
+    assert study("--part", "1/4") == 0 and study.results() == first
+    for k in (2, 3, 4):
+        assert study("--part", f"{k}/4") == 0
+    assert len(study.results()) == 6
+    assert study("--table-only") == 0
+    assert set(study.table()["status"]) == {"ok"} and len(study.table()["run"]) == 6
+    assert study("--part", "5/4") == 3 and study("--part", "1/4", "--table-only") == 3
+    assert "expected K/N, such as 3/16" in capsys.readouterr().err
+
+
 def test_dask_scheduler_by_its_address(study: Study) -> None:
     distributed = pytest.importorskip("distributed")
     study.write(FAILING)

@@ -103,6 +103,11 @@ module fw_case
       type(string_type), allocatable :: inputs(:)
       !> What stands in the model file and nothing reads.
       type(string_type), allocatable :: unread(:)
+      !> Up to which frequency the model was reduced [Hz]; 0: it does not say.
+      real(wp) :: reduced_up_to = 0.0_wp
+      !> Whether modes are damped by a ratio, and up to which frequency [Hz]; 0: all are.
+      logical :: damps_modes = .false.
+      real(wp) :: damps_modes_up_to = 0.0_wp
       !> Groups &contact and &spring that are given where there are no pairs and no springs.
       logical :: idle_contact = .false., idle_spring = .false.
       !> Result file of a wear run that is to be continued; not allocated to start anew. No key of

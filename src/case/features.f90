@@ -120,6 +120,8 @@ contains
          asked = case%control%is_wanted()
       case ('mode%synthesis')
          asked = a == analysis_mode .and. allocated(case%mode%synthesis)
+      case ('model%modal_damping_up_to')
+         asked = case%damps_modes_up_to > 0.0_wp
       case ('group &cyclic')
          asked = case%model%cyclic%has_sectors()
       case (matrices_alone)

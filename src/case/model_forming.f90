@@ -4,7 +4,7 @@ module fw_model_forming
    use fw_cyclic_data, only: speed_matrices
    use fw_damping, only: add_modal_damping
    use fw_error, only: error_type
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_model, only: matrix_change, model_type
    use fw_raw_model, only: raw_model
    use fw_model_keys, only: model_options
@@ -194,7 +194,7 @@ contains
          model%cyclic%modal_damping = options%modal_damping
       else if (options%modal_damping > 0.0_wp) then
          call add_modal_damping(model%mass, model%stiffness, options%modal_damping, &
-                                model%damping, error)
+                                model%damping, error, 2.0_wp*pi*options%modal_damping_up_to)
       end if
       if (model%cyclic%is_cyclic .or. allocated(error)) return
       call find_changes(options, raw, wanted, model, error)
@@ -258,7 +258,8 @@ contains
          change%value = options%rayleigh_stiffness
       case (modal_damping)
          ! The damping of all modes is proportional to the ratio.
-         call add_modal_damping(model%mass, model%stiffness, 1.0_wp, change%damping, error)
+         call add_modal_damping(model%mass, model%stiffness, 1.0_wp, change%damping, error, &
+                                2.0_wp*pi*options%modal_damping_up_to)
          change%value = options%modal_damping
       case (loss_factor)
          change%stiffness = model%stiffness
@@ -312,7 +313,7 @@ contains
          speed = options%rotation_speed + place(k)*h
          stiffness = model%stiffness + (speed**2 - options%rotation_speed**2)*rotation
          call add_modal_damping(model%mass, stiffness, weight(k)/h*options%modal_damping, damping, &
-                                error)
+                                error, 2.0_wp*pi*options%modal_damping_up_to)
          if (allocated(error)) return
       end do
    end subroutine change_modal_damping

@@ -49,6 +49,9 @@ module fw_raw_model
       real(wp), allocatable :: harmonic_cosine(:, :), harmonic_sine(:, :)
       !> Frequencies [rad/s], and what multiplies all vibratory loads there (n_table).
       real(wp), allocatable :: table_frequency(:), table_scale(:)
+      !> Up to which frequency the model was reduced [Hz], and the estimated error there; one number
+      !> each.
+      real(wp), allocatable :: reduction_frequency(:), reduction_error(:)
       !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
       real(wp), allocatable :: coriolis(:, :)
       type(stress_parts) :: stress
@@ -124,6 +127,10 @@ contains
                    self%stiffness_unsymmetric)
       call to%bind(part('damping_unsymmetric', 'dof dof', 'any: added to the damping'), &
                    self%damping_unsymmetric)
+      call to%bind(part('reduction/frequency', '1', 'up to which the model was reduced to an '// &
+                        'accuracy [Hz]'), self%reduction_frequency)
+      call to%bind(part('reduction/error', '1', 'estimated error of the stiffness of the joint '// &
+                        'there, relative'), self%reduction_error)
    end subroutine bind_structure
 
    subroutine bind_pairs(pairs, to)

@@ -69,6 +69,8 @@ module fw_rules
                 'a point depends on all those before; run it whole'), &
       rule_type('sweep%parameter', 'group &sensitivity', &
                 'derivatives are those at the values of the case; leave one of the two out'), &
+      rule_type('model%modal_damping_up_to', 'group &cyclic', &
+                'all modes of the tied sectors are damped; leave it out'), &
       rule_type('sweep%parameter', 'output%tail', 'take more n_harmonics'), &
       rule_type('sweep%parameter', 'sweep%refine = .true.', &
                 'no maxima are looked for; leave it out'), &

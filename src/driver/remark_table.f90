@@ -62,6 +62,13 @@ module fw_remark_table
       remark_kind('unstable', &
                   'coriolis, circulatory, unsymmetric or air forces: the linear structure '// &
                   'without contact has a mode that grows'), &
+      remark_kind('beyond reduction', &
+                  'the model file says up to which frequency it was reduced '// &
+                  '(/reduction/frequency), and the highest harmonic of the highest frequency '// &
+                  'is above it'), &
+      remark_kind('damping of all modes', &
+                  'modal_damping takes all modes of 3,000 coordinates or more, and long: '// &
+                  'modal_damping_up_to takes the lowest'), &
       remark_kind('one harmonic', &
                   'contact or springs, and n_harmonics = 1'), &
       remark_kind('too few harmonics', &

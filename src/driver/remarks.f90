@@ -102,6 +102,7 @@ contains
       end if
       call remark_unstable(case, remarks)
       call remark_unused(case, remarks)
+      call remark_reduction(case, remarks)
       call remark_harmonics(case, remarks)
       call remark_law(case, remarks)
       call remark_tail(case, remarks)
@@ -278,6 +279,37 @@ contains
       has_mass = .false.
       if (dof > 0) has_mass = case%model%mass(dof, dof) > 0.0_wp
    end function has_mass
+
+   !> A model that was reduced up to a frequency says nothing above it; modal damping of large
+   !> models takes long.
+   subroutine remark_reduction(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      integer, parameter :: large = 3000
+      ! The frequency of the file may be that of the case, but for round-off.
+      real(wp), parameter :: above = 1.0_wp + 1.0e-9_wp
+      real(wp) :: range(2), highest
+      integer :: harmonic
+
+      range = case%sweep%start
+      if (case%sweep%end > 0.0_wp .or. allocated(case%sweep%frequencies)) range = case%sweep%range()
+      ! Of an accuracy n_harmonics is a limit that points seldom come to.
+      harmonic = merge(1, case%harmonics%n_harmonics, case%harmonics%accuracy > 0.0_wp)
+      highest = range(2)/(2.0_wp*pi)*harmonic
+      if (case%reduced_up_to > 0.0_wp .and. highest > above*case%reduced_up_to .and. &
+          analyses(case%analysis)%has_points) then
+         call remarks%add('beyond reduction', 'the model was reduced to an accuracy up to '// &
+            to_text(rounded(case%reduced_up_to))//' Hz, and harmonic '// &
+            to_text(harmonic)//' reaches '//to_text(rounded(highest))// &
+            ' Hz: reduce it with --up-to of that')
+      end if
+      if (case%damps_modes .and. .not. case%damps_modes_up_to > 0.0_wp .and. &
+          case%model%n_dof >= large .and. .not. case%model%cyclic%is_cyclic) then
+         call remarks%add('damping of all modes', 'model%modal_damping of '// &
+            to_text(case%model%n_dof)//' coordinates takes all their modes, and long: '// &
+            'model%modal_damping_up_to takes the lowest ones')
+      end if
+   end subroutine remark_reduction
 
    !> One harmonic says little of a joint.
    subroutine remark_harmonics(case, remarks)

@@ -277,6 +277,7 @@ contains
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)
       if (allocated(raw%unread)) case%unread = raw%unread
+      if (allocated(raw%reduction_frequency)) case%reduced_up_to = raw%reduction_frequency(1)
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep, case%over)
       if (.not. reader%failed()) call check_order(reader, case)
@@ -433,6 +434,8 @@ contains
                           .not. reader%given('contact', 'n_pairs')
       case%idle_spring = case%springs%n_springs == 0 .and. reader%has_group('spring') .and. &
                          .not. reader%given('spring', 'n_springs')
+      case%damps_modes = options%modal_damping > 0.0_wp
+      case%damps_modes_up_to = options%modal_damping_up_to
       call read_loads(reader, options, raw, terms)
       call case%stress%take(raw%stress, options%rotation_speed)
       call read_motion(reader, case%model%cyclic%is_cyclic, raw, case%contact, case%springs)

@@ -86,8 +86,8 @@ contains
 
       if (.not. analyses(case%analysis)%wears) then
          call fatal_error(error, "--restart continues a run of analysis = 'wear', but this "// &
-                          "case has analysis = '"//trim(analysis_words(case%analysis))//"'", &
-                          status_usage)
+                          "case has analysis = '"//trim(analysis_words(case%analysis))// &
+                          "'; a natural sweep goes on by fretwear run --restart", status_usage)
          return
       end if
       self%path = path

@@ -11,7 +11,7 @@ module fw_lapack
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
    public :: zggev, sgetrf, strsm, dlaswp, dtrsm, dtrmm, dsyrk, dpocon, dsygst
-   public :: dsyevr, zgeev
+   public :: dsyevr, dsytrf, zgeev
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -223,6 +223,18 @@ module fw_lapack
          real(wp), intent(inout) :: a(lda, *)
          integer, intent(out) :: info
       end subroutine dpotrf
+
+      !> L D L^T of a symmetric matrix by diagonal pivoting, in the triangle of a; ipiv is negative
+      !> where D has a block of order two, one of whose eigenvalues is negative.
+      subroutine dsytrf(uplo, n, a, lda, ipiv, work, lwork, info)
+         import :: wp
+         implicit none (type, external)
+         character, intent(in) :: uplo
+         integer, intent(in) :: n, lda, lwork
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*), info
+         real(wp), intent(out) :: work(*)
+      end subroutine dsytrf
 
       !> Eigenpairs of a symmetric matrix with values in (vl, vu] (range 'V'), in ascending order; a
       !> is spoilt.

@@ -9,6 +9,7 @@ module fw_damping
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm, dpocon, dpotrf, dsygst, dsyrk, dtrmm
    use fw_linalg, only: diagonalize
+   use fw_lowest_modes, only: find_lowest_modes
    implicit none (type, external)
    private
 
@@ -17,14 +18,17 @@ module fw_damping
    !> Eigenvalues below this share of the largest count as zero: round-off of an order 1000
    !> matrix stays well below, a physical mass or stiffness ratio well above.
    real(wp), parameter :: rank_tolerance = 1.0e-12_wp
+   !> Squares of the lowest frequencies below this share of the bound count as zero: the shift by
+   !> which they are found leaves round-off of itself.
+   real(wp), parameter :: zero_square = 1.0e-10_wp
    !> Reciprocal condition of the scaled M above which it has no massless direction; its factor
    !> keeps more digits than its eigenvectors do.
    real(wp), parameter :: least_condition = 1.0e-11_wp
 
 contains
 
-   !> Add the damping of all modes to a damping matrix.
-   subroutine add_modal_damping(mass, stiffness, ratio, damping, error)
+   !> Add the damping of all modes, or of the lowest ones, to a damping matrix.
+   subroutine add_modal_damping(mass, stiffness, ratio, damping, error, up_to)
       !> Symmetric, positive semidefinite (n, n).
       real(wp), intent(in) :: mass(:, :)
       !> Symmetric (n, n); modes of negative or zero stiffness are not damped.
@@ -33,13 +37,25 @@ contains
       real(wp), intent(in) :: ratio
       real(wp), intent(inout) :: damping(:, :)
       type(error_type), allocatable, intent(out) :: error
+      !> Circular frequency above which no mode is damped [rad/s]; 0 and nothing: all are.
+      real(wp), intent(in), optional :: up_to
       real(wp), allocatable :: scale(:), values(:), vectors(:, :), condensed(:, :), root(:, :)
       real(wp), allocatable :: half(:, :)
+      real(wp) :: highest
       integer :: n_free
       logical :: done
 
       scale = unit_scale(mass, stiffness)
-      call by_factor(scaled(mass, scale), scaled(stiffness, scale), root, done, error)
+      highest = huge(1.0_wp)
+      if (present(up_to)) then
+         if (up_to > 0.0_wp) then
+            highest = up_to**2
+            call by_lowest_modes(scaled(mass, scale), scaled(stiffness, scale), scale, up_to, &
+                                 ratio, damping, done, error)
+            if (done .or. allocated(error)) return
+         end if
+      end if
+      call by_factor(scaled(mass, scale), scaled(stiffness, scale), highest, root, done, error)
       if (allocated(error)) return
       if (done) then
          call weigh_by_mass(root, 1.0_wp/scale)
@@ -57,7 +73,7 @@ contains
       ! With A = M**(-1/2) K M**(-1/2) the sum over the modes is 2 zeta M**(1/2) sqrt(A) M**(1/2),
       ! without any mode by itself. In the eigenvectors of M its powers are diagonal.
       call weigh_by_mass(condensed, 1.0_wp/sqrt(values(n_free + 1:)))
-      call take_root(condensed, root, error)
+      call take_root(condensed, highest, root, error)
       if (allocated(error)) return
       call weigh_by_mass(root, sqrt(values(n_free + 1:)))
       ! Back from these vectors to the scaled dofs, and from there to the dofs.
@@ -68,11 +84,39 @@ contains
       damping = damping + 2.0_wp*ratio*root
    end subroutine add_modal_damping
 
+   !> The modes up to a frequency by themselves, where they are few.
+   subroutine by_lowest_modes(mass, stiffness, scale, up_to, ratio, damping, done, error)
+      !> Scaled to a unit diagonal of M, by these factors.
+      real(wp), intent(in) :: mass(:, :), stiffness(:, :), scale(:)
+      real(wp), intent(in) :: up_to, ratio
+      real(wp), intent(inout) :: damping(:, :)
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: squares(:), moved(:, :), weighed(:, :), product(:, :)
+      real(wp) :: least
+      integer :: j
+
+      call find_lowest_modes(mass, stiffness, up_to, squares, moved, done, error)
+      if (allocated(error) .or. .not. done) return
+      if (size(squares) == 0) return
+      weighed = moved
+      least = zero_square*up_to**2
+      do j = 1, size(squares)
+         moved(:, j) = moved(:, j)/scale
+         weighed(:, j) = moved(:, j)*merge(sqrt(max(squares(j), 0.0_wp)), 0.0_wp, &
+                                           squares(j) > least)
+      end do
+      call multiply('N', weighed, 'T', moved, product)
+      damping = damping + ratio*(product + transpose(product))
+   end subroutine by_lowest_modes
+
    !> M Phi diag(omega) Phi^T M where M is far from singular: with M = L L^T the modes are
    !> L^-T Y, Y the eigenvectors of L^-1 K L^-T. One eigenvalue problem instead of two.
-   subroutine by_factor(mass, stiffness, root, done, error)
+   subroutine by_factor(mass, stiffness, highest, root, done, error)
       !> Scaled to a unit diagonal of M.
       real(wp), intent(in) :: mass(:, :), stiffness(:, :)
+      !> Square of a frequency above which modes are left out.
+      real(wp), intent(in) :: highest
       real(wp), allocatable, intent(out) :: root(:, :)
       !> False where M is not far from singular; there is no root then.
       logical, intent(out) :: done
@@ -104,7 +148,7 @@ contains
       least = rank_tolerance*maxval(abs(values))
       do j = 1, n
          vectors(:, j) = vectors(:, j)*merge(sqrt(sqrt(max(values(j), 0.0_wp))), 0.0_wp, &
-                                             values(j) > least)
+                                             values(j) > least .and. values(j) <= highest)
       end do
       allocate (root(n, n))
       call dsyrk('L', 'N', n, n, 1.0_wp, vectors, n, 0.0_wp, root, n)
@@ -193,8 +237,10 @@ contains
    end subroutine condense
 
    !> Symmetric square root, with zero for eigenvalues that are not positive.
-   subroutine take_root(matrix, root, error)
+   subroutine take_root(matrix, highest, root, error)
       real(wp), intent(in) :: matrix(:, :)
+      !> Eigenvalues above it are left out.
+      real(wp), intent(in) :: highest
       real(wp), allocatable, intent(out) :: root(:, :)
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: vectors(:, :), scaled_vectors(:, :), values(:)
@@ -208,7 +254,8 @@ contains
       scaled_vectors = vectors
       do j = 1, size(values)
          scaled_vectors(:, j) = vectors(:, j)* &
-                                merge(sqrt(max(values(j), 0.0_wp)), 0.0_wp, values(j) > least)
+                                merge(sqrt(max(values(j), 0.0_wp)), 0.0_wp, &
+                                      values(j) > least .and. values(j) <= highest)
       end do
       call multiply('N', scaled_vectors, 'T', vectors, root)
    end subroutine take_root

@@ -29,6 +29,8 @@ module fw_model_keys
       real(wp) :: rayleigh_stiffness = 0.0_wp
       !> Fraction of critical damping of every mode.
       real(wp) :: modal_damping = 0.0_wp
+      !> Highest frequency of the modes that are damped so [Hz] (0: all are).
+      real(wp) :: modal_damping_up_to = 0.0_wp
       !> [rad/s]
       real(wp) :: rotation_speed = 0.0_wp
       !> Hysteretic damping in parts of the stiffness.
@@ -122,6 +124,9 @@ contains
                          'damping', at_least(0.0_wp), unit='s'), self%rayleigh_stiffness)
       call keys%bind(key('modal_damping', 'fraction of critical damping of every mode with '// &
                          'open contact', at_least(0.0_wp)), self%modal_damping)
+      call keys%bind(key('modal_damping_up_to', 'of modes up to this frequency alone, which '// &
+                         'takes less time; 0: of all', at_least(0.0_wp), unit='Hz', &
+                         only='modal_damping'), self%modal_damping_up_to)
       call keys%bind(key('rotation_speed', 'adds its square times stiffness_rotation and '// &
                          'load/static_rotation of the model file, and its multiple of '// &
                          'coriolis and circulatory', at_least(0.0_wp), &

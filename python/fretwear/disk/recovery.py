@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..mesh import RecoveryMesh
@@ -30,9 +31,10 @@ def recovery_mesh(full: FullDisk) -> tuple[RecoveryMesh, Floats]:
     reduction = reduced_system(full).reduction
     mesh, p = full.sector.mesh, full.parameters
     n_vertices = mesh.p.shape[1]
-    basis = np.zeros((3 * n_vertices, reduction.basis.shape[1]))
-    at_vertex = full.free < 3 * n_vertices
-    basis[full.free[at_vertex]] = reduction.basis[at_vertex]
+    at_vertex = np.flatnonzero(full.free < 3 * n_vertices)
+    basis = reduction.row(sp.csr_array(
+        (np.ones(len(at_vertex)), (full.free[at_vertex], at_vertex)),
+        (3 * n_vertices, len(full.free))))
     boundary = mesh.boundary_facets()
     boundary = boundary[full.sector.body[mesh.f2t[0, boundary]] == SHROUD]
     centre = mesh.p[:, mesh.facets[:, boundary]].mean(axis=1)

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from .._progress import stages
 from ..errors import InputError, OutputError
+from ..factors import ENGINES, chosen_engine
+from .accuracy import Accuracy
 from .build import ROLES, FullModel, Source, drop, gather, model_datasets, read_rows, save
 from .checks import check_model
 from .finding import Finding
@@ -20,7 +22,7 @@ from .meshes import ImportedMesh, read_mesh_file
 from .sectors import FRAMES, Interfaces, axis_of, in_sector_frames, read_interfaces
 from .tables import Pairs, contact_rows, read_loads, read_pairs
 
-__all__ = ["FORMATS", "Dofs", "Finding", "FullModel", "ImportedMesh", "Interfaces",
+__all__ = ["FORMATS", "Accuracy", "Dofs", "Finding", "FullModel", "ImportedMesh", "Interfaces",
            "MatrixFile", "Pairs", "Source", "add_arguments", "check_model", "contact_rows", "drop",
            "gather", "main", "model_datasets", "read_interfaces", "read_label_table", "read_loads",
            "read_matrices", "read_mesh_file", "read_pairs", "save"]
@@ -58,6 +60,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="observed degree of freedom: number or node:component; repeatable")
     parser.add_argument("--reduce", type=int, metavar="N_MODES",
                         help="reduce to relative displacements and so many bonded modes")
+    parser.add_argument("--accuracy", type=float, metavar="X",
+                        help="in place of --reduce: as many modes as an estimated error X of the "
+                             "stiffness of the joint takes; needs --up-to")
+    parser.add_argument("--up-to", type=float, metavar="HZ",
+                        help="frequency up to which --accuracy is to hold: the highest harmonic "
+                             "times the highest frequency")
+    parser.add_argument("--verify", action="store_true",
+                        help="compare the stiffness of the joint at --up-to with the full "
+                             "matrices, by one factorization more")
+    parser.add_argument("--factor", choices=ENGINES, default="auto",
+                        help="who factors the stiffness: the first of mumps, cholmod and superlu "
+                             "that is installed, or one of them by name (default: auto)")
     parser.add_argument("--sectors", type=int, metavar="N",
                         help="the model is one of N equal sectors around an axis; needs --left "
                              "and --right")
@@ -89,12 +103,15 @@ def main(options: argparse.Namespace) -> int:
             raise InputError("nothing to write: give -o MODEL.h5, or --check")
         if not options.output.absolute().parent.is_dir():
             raise OutputError(f"no folder to write {options.output} into")
+    chosen_engine(options.factor)   # refused before the work
     model = _read(options)
-    found = [Finding("note", "files", note) for note in model.notes] + check_model(model)
+    found = [Finding("note", "files", note) for note in model.notes] + check_model(
+        model, options.factor)
+    wanted = _modes(options)
     wrong = [finding for finding in found if finding.kind == "error"]
-    if not wrong and options.check and options.reduce is not None:
+    if not wrong and options.check and wanted is not None:
         # Says what a reduction would refuse.
-        model_datasets(model, options.reduce, options.by_diameter)
+        model_datasets(model, wanted, options.by_diameter, factor=options.factor)
     for finding in found:
         if finding.kind == "warning" or (finding.kind == "note" and not options.quiet):
             print(finding, file=sys.stdout if options.check else sys.stderr)
@@ -104,11 +121,31 @@ def main(options: argparse.Namespace) -> int:
         print(f"no errors in {model.dofs.n} degrees of freedom, "
               f"{0 if model.pairs is None else len(model.pairs)} pairs")
         return 0
-    for finding in save(model, options.output, options.reduce, options.by_diameter,
-                        stages(quiet=options.quiet)):
+    for finding in save(model, options.output, wanted, options.by_diameter,
+                        stages(quiet=options.quiet), options.factor,
+                        verify=options.up_to if options.verify else None):
         if finding.kind == "warning" or not options.quiet:
             print(finding, file=sys.stderr)
     return 0
+
+
+def _modes(options: argparse.Namespace) -> int | Accuracy | None:
+    """How far the model is to be reduced."""
+    if options.verify and (options.up_to is None or options.by_diameter):
+        raise InputError("--verify needs --up-to HZ, the frequency that it compares at, and does "
+                         "not go with --by-diameter")
+    if options.accuracy is None:
+        if options.up_to is not None and not options.verify:
+            raise InputError("--up-to goes with --accuracy X or --verify")
+        if options.verify and options.reduce is None:
+            raise InputError("--verify goes with --reduce N_MODES or --accuracy X")
+        return options.reduce
+    if options.reduce is not None:
+        raise InputError("--accuracy does not go with --reduce: it takes as many modes as it needs")
+    if options.up_to is None:
+        raise InputError("--accuracy needs --up-to HZ: the highest harmonic times the highest "
+                         "frequency")
+    return Accuracy(options.accuracy, options.up_to)
 
 
 def _read(options: argparse.Namespace) -> FullModel:

@@ -12,9 +12,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..factors import chosen_engine
 from ..mesh import mesh_datasets
 from ..model_file import strings, write_model_file
-from ..reduction import Progress, reduce
+from ..reduction import Progress, Reduction, reduce
+from ..reduction_error import true_error
+from .accuracy import Accuracy, mode_options, range_datasets
 from .diameters import reduce_diameters
 from .finding import Finding
 from .labels import Dofs
@@ -25,8 +28,8 @@ from .recovery import recovery_mesh
 from .sectors import Interfaces
 from .tables import LOADS, Pairs, contact_rows
 
-__all__ = ["ROLES", "FullModel", "Source", "drop", "gather", "model_datasets", "read_rows",
-           "save"]
+__all__ = ["ROLES", "Accuracy", "FullModel", "Source", "drop", "gather", "model_datasets",
+           "read_rows", "save"]
 
 Floats = NDArray[np.float64]
 
@@ -223,31 +226,34 @@ def drop(model: FullModel, *, empty: bool) -> FullModel:
                f"degrees of freedom are left out; {len(kept)} remain"])
 
 
-def model_datasets(model: FullModel, n_modes: int | None, by_diameter: bool = False,
-                   progress: Progress | None = None) -> dict[str, NDArray[Any]]:
+def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter: bool = False,
+                   progress: Progress | None = None,
+                   factor: str = "auto") -> dict[str, NDArray[Any]]:
     """Datasets of the model file by name.
 
     Parameters
     ----------
     model : FullModel
         The model, checked.
-    n_modes : int or None
-        Reduce to the contact coordinates, so many bonded modes and the attachment vectors of
-        the loads; None: leave the degrees of freedom as they are.
+    n_modes : int or Accuracy or None
+        Reduce to the contact coordinates, so many bonded modes (or those that an accuracy takes)
+        and the attachment vectors of the loads; None: leave the degrees of freedom as they are.
     by_diameter : bool
         Reduce a sector on its own in every nodal diameter.
     progress : callable, optional
         Told how far a reduction is.
+    factor : str
+        Who factors, as `fretwear.reduction.reduce` takes it.
     """
-    symmetric = {role: (matrix + matrix.T) * 0.5 for role, matrix in model.matrices.items()}
+    symmetric = {role: _symmetric(matrix) for role, matrix in model.matrices.items()}
     observed = _observed(model)
     cyclic = model.interfaces is not None
     if by_diameter:
-        return _by_diameter(model, symmetric, n_modes)
+        return _by_diameter(model, symmetric, n_modes, factor)
     if cyclic and model.pairs is not None and model.pairs.rows is not None:
         raise InputError("pairs of sectors need degrees of freedom of their own on both sides: "
                          "columns side_1_t1 ... side_2_n and sector_2")
-    basis: Floats | None = None
+    reduction: Reduction | None = None
     if n_modes is None:
         if model.pairs is not None and model.pairs.rows is not None:
             raise InputError("pairs given by nodes and normals, or by rows, are no degrees of "
@@ -260,11 +266,11 @@ def model_datasets(model: FullModel, n_modes: int | None, by_diameter: bool = Fa
         if model.interfaces is not None:
             data |= {"cyclic/left": model.interfaces.left, "cyclic/right": model.interfaces.right}
     else:
-        data = (_reduced_sector if cyclic else _reduced)(model, symmetric, n_modes, progress)
-        basis = data.pop("basis")
-        observed = np.asarray(observed @ basis)
+        data, reduction = (_reduced_sector if cyclic else _reduced)(model, symmetric, n_modes,
+                                                                    progress, factor)
+        observed = reduction.row(observed)
     if model.mesh is not None:
-        data |= mesh_datasets(recovery_mesh(model, basis))
+        data |= mesh_datasets(recovery_mesh(model, reduction))
     if model.pairs is not None:
         data.update(_pair_values(model.pairs))
     if model.observe:
@@ -273,20 +279,27 @@ def model_datasets(model: FullModel, n_modes: int | None, by_diameter: bool = Fa
     return data
 
 
-def _reduced(model: FullModel, matrices: dict[str, sp.csr_array], n_modes: int,
-             progress: Progress | None) -> dict[str, NDArray[Any]]:
+def _symmetric(matrix: sp.csr_array) -> sp.csr_array:
+    """The symmetric part: the matrix itself, as most are, without a copy of it."""
+    half = (matrix + matrix.T) * 0.5
+    return matrix if abs(half - matrix).sum() == 0.0 else half
+
+
+def _reduced(model: FullModel, matrices: dict[str, sp.csr_array], n_modes: int | Accuracy,
+             progress: Progress | None, factor: str) -> tuple[dict[str, NDArray[Any]], Reduction]:
     if model.pairs is None:
         raise InputError("--reduce needs contact pairs (--pairs): the reduction keeps their "
                          "relative displacements")
     rows, number = contact_rows(model.pairs, model.dofs.n)
-    data = _condensed(model, matrices, rows, n_modes, progress)
+    data, reduction = _condensed(model, matrices, rows, n_modes, progress, factor)
     data["contact/side_1"] = number.astype(np.int32)
     data["contact/side_2"] = np.zeros_like(data["contact/side_1"])
-    return data
+    return data, reduction
 
 
-def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array], n_modes: int,
-                    progress: Progress | None) -> dict[str, NDArray[Any]]:
+def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array], n_modes: int | Accuracy,
+                    progress: Progress | None,
+                    factor: str) -> tuple[dict[str, NDArray[Any]], Reduction]:
     """Interfaces and both sides of the pairs as they are, and modes with all of them held."""
     assert model.interfaces is not None
     sides = np.zeros((2, 0, 3), dtype=np.int32) if model.pairs is None else np.stack(
@@ -298,32 +311,35 @@ def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array], n_modes
                         (len(kept), model.dofs.n))
     place = np.zeros(model.dofs.n + 1, dtype=np.int32)
     place[kept + 1] = np.arange(1, len(kept) + 1)
-    data = _condensed(model, matrices, rows, n_modes, progress)
+    data, reduction = _condensed(model, matrices, rows, n_modes, progress, factor)
     n = len(model.interfaces.left)
     data["cyclic/left"] = np.arange(1, n + 1, dtype=np.int32)
     data["cyclic/right"] = np.arange(n + 1, 2 * n + 1, dtype=np.int32)
     if model.pairs is not None:
         for name, side in zip(("contact/side_1", "contact/side_2"), sides):
             data[name] = np.sign(side) * place[np.abs(side)]
-    return data
+    return data, reduction
 
 
 def _condensed(model: FullModel, matrices: dict[str, sp.csr_array], rows: sp.csr_array,
-               n_modes: int, progress: Progress | None) -> dict[str, NDArray[Any]]:
-    """Matrices, loads and the basis of the reduction that keeps the given rows."""
+               n_modes: int | Accuracy, progress: Progress | None,
+               factor: str) -> tuple[dict[str, NDArray[Any]], Reduction]:
+    """Matrices and loads, and the reduction that keeps the given rows."""
     loads = np.column_stack([model.loads[name] for name in model.loads] or
                             [np.zeros(model.dofs.n)])
     attached = np.column_stack((loads, _observed(model).toarray().T))
-    system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
-                    damping=matrices.get("damping"), attachments=attached, progress=progress)
+    system = reduce(matrices["mass"], matrices["stiffness"], rows, **mode_options(n_modes),
+                    loads=loads, damping=matrices.get("damping"), attachments=attached,
+                    progress=progress, factor=factor)
     data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
     if system.damping is not None:
         data["damping"] = system.damping
     if "stiffness_rotation" in matrices:
         data["stiffness_rotation"] = system.reduction.matrix(matrices["stiffness_rotation"])
     data.update({f"load/{name}": system.loads[:, k] for k, name in enumerate(model.loads)})
-    data["basis"] = system.reduction.basis
-    return data
+    if system.error is not None and system.frequency is not None:
+        data |= range_datasets(system.frequency, system.error)
+    return data, system.reduction
 
 
 def _observed(model: FullModel) -> sp.csr_array:
@@ -335,7 +351,7 @@ def _observed(model: FullModel) -> sp.csr_array:
 
 
 def _by_diameter(model: FullModel, matrices: dict[str, sp.csr_array],
-                 n_modes: int | None) -> dict[str, NDArray[Any]]:
+                 n_modes: int | Accuracy | None, factor: str) -> dict[str, NDArray[Any]]:
     """Complex matrices of every nodal diameter; pairs have no sides any more but rows."""
     if n_modes is None:
         raise InputError("--by-diameter goes with --reduce N_MODES")
@@ -343,7 +359,7 @@ def _by_diameter(model: FullModel, matrices: dict[str, sp.csr_array],
         raise InputError("--mesh does not go with --by-diameter: every nodal diameter has "
                          "coordinates of its own, which are no motions of one mesh; leave out "
                          "--by-diameter")
-    sectors, data = reduce_diameters(model, matrices, n_modes, _observed(model))
+    sectors, data = reduce_diameters(model, matrices, n_modes, _observed(model), factor)
     data |= sectors.datasets()
     if model.pairs is not None:
         data |= _pair_values(replace(model.pairs, sector_2=None))
@@ -359,10 +375,12 @@ def _pair_values(pairs: Pairs) -> dict[str, NDArray[Any]]:
     return {f"contact/{name}": value for name, value in values.items() if value is not None}
 
 
-def save(model: FullModel, path: str | Path, n_modes: int | None = None,
-         by_diameter: bool = False, progress: Progress | None = None) -> list[Finding]:
-    """Write the model file of a checked model; returns what is to be known about it."""
-    data = model_datasets(model, n_modes, by_diameter, progress)
+def save(model: FullModel, path: str | Path, n_modes: int | Accuracy | None = None,
+         by_diameter: bool = False, progress: Progress | None = None,
+         factor: str = "auto", verify: float | None = None) -> list[Finding]:
+    """Write the model file of a checked model; returns what is to be known about it, with the
+    error of the stiffness of the joint at the frequency `verify` [Hz]."""
+    data = model_datasets(model, n_modes, by_diameter, progress, factor)
     groups = {} if model.interfaces is None else {
         "cyclic": {"n_sectors": model.interfaces.n_sectors}}
     if by_diameter:
@@ -373,7 +391,28 @@ def save(model: FullModel, path: str | Path, n_modes: int | None = None,
     found = [Finding("note", str(path), f"{n} degrees of freedom, "
                      f"{0 if model.pairs is None else len(model.pairs)} pairs, loads "
                      + (", ".join(name for name in LOADS if name in model.loads) or "none"))]
+    if "reduction/error" in data:
+        found.append(Finding("note", str(path), "estimated error of the stiffness of the joint up "
+                             f"to {data['reduction/frequency'][0]:.6g} Hz: "
+                             f"{data['reduction/error'][0]:.2g}"))
+    if verify is not None:
+        found.append(Finding("note", str(path), "error of the stiffness of the joint at "
+                             f"{verify:.6g} Hz, by the full matrices: "
+                             f"{_true_error(model, data, verify, factor):.2g}"))
+    if n_modes is not None:
+        found.append(Finding("note", str(path), f"factors by {chosen_engine(factor)}"))
     if n > _LARGE:
         found.append(Finding("warning", str(path), f"fw_run works with full matrices of {n} x {n}; "
                              "reduce the model with --reduce N_MODES"))
     return found
+
+
+def _true_error(model: FullModel, data: Mapping[str, NDArray[Any]], frequency: float,
+                factor: str) -> float:
+    if model.pairs is None or model.interfaces is not None:
+        raise InputError("--verify is for structures with pairs, without --sectors")
+    rows, _ = contact_rows(model.pairs, model.dofs.n)
+    mass, stiffness = ((matrix + matrix.T) * 0.5 for matrix in
+                       (model.matrices["mass"], model.matrices["stiffness"]))
+    return true_error(data["mass"], data["stiffness"], mass, stiffness, rows,
+                      2.0 * np.pi * frequency, engine=factor)

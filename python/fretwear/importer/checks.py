@@ -40,8 +40,8 @@ _FRICTION = 1.5
 Findings = Iterator[Finding]
 
 
-def check_model(model: FullModel) -> list[Finding]:
-    """Check matrices, loads and pairs of a model, before any reduction."""
+def check_model(model: FullModel, engine: str = "auto") -> list[Finding]:
+    """Check matrices, loads and pairs of a model, before any reduction; `engine` factors."""
     found = [finding for check in (_finite, _symmetric, _diagonals)
              for name, matrix in model.matrices.items()
              for finding in check(model, name, matrix)]
@@ -55,7 +55,7 @@ def check_model(model: FullModel) -> list[Finding]:
         found += check_mesh(model)
     # The spectrum means something only where the matrices do.
     if not any(finding.kind == "error" for finding in found):
-        found += _spectrum(model)
+        found += _spectrum(model, engine)
     return found
 
 
@@ -236,10 +236,10 @@ def _dependent(model: FullModel, pairs: Pairs) -> Findings:
 # ----------------------------------------------------------------------- spectrum
 
 
-def _spectrum(model: FullModel) -> Findings:
+def _spectrum(model: FullModel, engine: str) -> Findings:
     mass, stiffness = model.matrices["mass"], model.matrices["stiffness"]
     for name in ("mass", "stiffness"):
-        negative = negative_directions(model.matrices[name])
+        negative = negative_directions(model.matrices[name], engine)
         if negative:
             yield Finding("error" if name == "mass" else "warning", name,
                           f"not positive semidefinite: {negative} negative eigenvalues; "
@@ -247,13 +247,13 @@ def _spectrum(model: FullModel) -> Findings:
                              "the structure is unstable, or spin softening is in it (which "
                              "belongs in stiffness_rotation)"))
             return
-    spectrum = lowest_modes(mass, stiffness)
+    spectrum = lowest_modes(mass, stiffness, engine)
     if spectrum is None:
         yield Finding("error", "mass and stiffness", "a motion has neither mass nor stiffness (a "
                       "mechanism of massless degrees of freedom); hold it or give it mass")
         return
     if model.interfaces is not None:
-        tied = tied_spectrum(model, model.interfaces)
+        tied = tied_spectrum(model, model.interfaces, engine)
         if tied is None:
             yield Finding("error", "interfaces", "tied in nodal diameter 0 a motion has neither "
                           "mass nor stiffness")

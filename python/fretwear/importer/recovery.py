@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..mesh import RecoveryMesh
+from ..reduction import Reduction
 from .finding import Finding
 from .meshes import ImportedMesh
 from .tables import side_rows
@@ -48,20 +49,20 @@ _FEWEST = 24
 _LARGE = 200e6
 
 
-def recovery_mesh(model: FullModel, basis: Floats | None) -> RecoveryMesh:
+def recovery_mesh(model: FullModel, reduction: Reduction | None) -> RecoveryMesh:
     """The mesh of a model with the motion of its points.
 
     Parameters
     ----------
     model : FullModel
         With a mesh.
-    basis : (n, n_q) or None
-        Displacement per unit of each coordinate; None: the coordinates are those of the matrices.
+    reduction : Reduction or None
+        Gives the displacement by each coordinate; None: the coordinates are those of the matrices.
     """
     mesh = _mesh(model)
     spread = _spread(model, mesh)
-    moved = (spread if basis is None else spread @ basis)
-    motion = np.asarray(moved.toarray() if sp.issparse(moved) else moved, dtype=np.float32)
+    motion = (np.asarray(spread.toarray(), dtype=np.float32) if reduction is None
+              else reduction.row(spread, np.float32))
     facets, pair, points, average = _facets(model, mesh)
     if len(points) > len(mesh.points):
         added = average @ motion.reshape(len(mesh.points), -1)

@@ -130,12 +130,13 @@ def in_sector_frames(model: FullModel, interfaces: Interfaces) -> FullModel:
                "the frame of the next sector"])
 
 
-def tied_spectrum(model: FullModel, interfaces: Interfaces) -> Spectrum | None:
+def tied_spectrum(model: FullModel, interfaces: Interfaces,
+                  engine: str = "auto") -> Spectrum | None:
     """Lowest modes that all sectors make alike (nodal diameter 0)."""
     alike = tie(interfaces, model.dofs.n)
     mass, stiffness = (sp.csr_array(alike.T @ model.matrices[role] @ alike)
                        for role in ("mass", "stiffness"))
-    return lowest_modes(mass, stiffness)
+    return lowest_modes(mass, stiffness, engine)
 
 
 def tie(interfaces: Interfaces, n: int, factor: complex = 1.0) -> sp.csr_array:

@@ -11,6 +11,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.typing import NDArray
 
+from ..errors import InputError
+from ..factors import factor
+
 __all__ = ["Spectrum", "lowest_modes", "negative_directions"]
 
 Floats = NDArray[np.float64]
@@ -46,7 +49,7 @@ class Spectrum:
     local: float
 
 
-def negative_directions(matrix: sp.csr_array) -> int:
+def negative_directions(matrix: sp.csr_array, engine: str = "auto") -> int:
     """Number of negative eigenvalues of a symmetric matrix, by the signs of its pivots.
 
     Counts on the degrees of freedom with a diagonal entry; a diagonal shift of 1e-10 of each
@@ -62,11 +65,15 @@ def negative_directions(matrix: sp.csr_array) -> int:
     scaled = sp.csc_matrix(scale @ shifted @ scale)
     if len(used) <= _DENSE:
         return int((la.eigvalsh(scaled.toarray()) < 0.0).sum())
-    factors = _factors(scaled)
-    return int((factors.U.diagonal() < 0.0).sum())
+    try:
+        factor(scaled, engine)
+    except InputError:
+        return int((_factors(scaled).U.diagonal() < 0.0).sum())
+    return 0
 
 
-def lowest_modes(mass: sp.csr_array, stiffness: sp.csr_array) -> Spectrum | None:
+def lowest_modes(mass: sp.csr_array, stiffness: sp.csr_array,
+                 engine: str = "auto") -> Spectrum | None:
     """Lowest modes; None where the stiffness and the mass leave a motion without either."""
     local = _local_squares(mass, stiffness)
     if not len(local):
@@ -82,7 +89,10 @@ def lowest_modes(mass: sp.csr_array, stiffness: sp.csr_array) -> Spectrum | None
             count = min(N_LOWEST, int((values > 1e-14 * values[0]).sum()))
             values, shapes = values[:count], shapes[:, :count]
         else:
-            factors = _factors(shifted)
+            try:
+                factors = factor(shifted, engine)
+            except InputError:
+                factors = _factors(shifted)
             solve = spl.LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
             start = 1.0 + np.cos(np.arange(n) ** 1.1)
             found, shapes = spl.eigsh(shifted, k=N_LOWEST, M=mass, sigma=0.0, OPinv=solve,
@@ -107,5 +117,6 @@ def _local_squares(mass: sp.csr_array, stiffness: sp.csr_array) -> Floats:
 
 
 def _factors(matrix: sp.csc_matrix) -> Any:
+    """Of a matrix that need not be definite: pivots on the diagonal, with their signs."""
     return spl.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                     options={"SymmetricMode": True})

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
@@ -19,6 +20,7 @@ from .._watching import (
     Progress,
     StopFlag,
     Tell,
+    run_watched,
     stop_reason,
     stops_on_interrupt,
     teller,
@@ -29,13 +31,15 @@ from ..result import Result
 from .cutting import Piece, cut
 from .joining import join
 from .overlap import Part, agree, tolerance_of
+from .restart import known_rows
 from .sharing import Board
 
-__all__ = ["run_in_pieces"]
+__all__ = ["plan_of", "run_in_pieces", "solve_piece"]
 
 
 def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress | None,
                   is_stopped: Callable[[], object] | None, *, in_memory: bool,
+                  restart: str | Path | None = None,
                   see: Callable[[Sequence[Part]], object] | None = None
                   ) -> tuple[Result, list[str]]:
     """Run a natural sweep in pieces, and join them.
@@ -56,6 +60,8 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
         As in `fretwear.run`.
     in_memory : bool
         Write no file.
+    restart : str or Path, optional
+        Result of the same sweep that was not finished: rows that it has are taken.
     see : callable, optional
         Given the parts before they are joined.
 
@@ -71,7 +77,8 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
         if scheduler not in HERE:
             # Before a cluster is asked; here the first piece is refused for the same.
             session.check()
-        plan = _plan(namelist_values(session.text("namelist")), session.frequencies())
+        plan = plan_of(namelist_values(session.text("namelist")), session.frequencies(),
+                       "workers" if restart is None else "--restart")
         text, path = session.text("namelist"), session.text("output")
         with teller(progress, session) as tell:
             control = np.zeros(CONTROL, dtype=np.int64)
@@ -81,7 +88,9 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
                     open_pool(scheduler, workers) as pool:
                 work = _Work(session, watch.board) if scheduler in HERE else (
                     _WorkElsewhere(case))
-                parts, remarks = _solve(work, plan, pool, watch)
+                known, wanted = ([], cut(len(plan.places), pool.workers)) if restart is None else (
+                    known_rows(restart, text, plan.places))
+                parts, remarks = _solve(work, plan, pool, watch, known, wanted)
     if not parts:
         _raise_ended(None, received, remarks)
     if see is not None:
@@ -113,13 +122,14 @@ class _Plan:
     tolerance: float
 
 
-def _plan(values: dict[str, list[str]], frequencies: NDArray[np.float64]) -> _Plan:
-    """Refuse what does not go in pieces."""
+def plan_of(values: dict[str, list[str]], frequencies: NDArray[np.float64],
+            said_by: str = "workers") -> _Plan:
+    """Refuse what does not go in pieces; `said_by` is what asks for them."""
     analysis, continuation = _word(values, "case%analysis"), _word(values, "sweep%continuation")
     if analysis != "frf" or continuation != "natural":
-        raise InputError("workers: a sweep in pieces is a natural one of analysis = 'frf'; this "
+        raise InputError(f"{said_by}: a sweep in pieces is a natural one of analysis = 'frf'; this "
                          f"is analysis = '{analysis}', continuation = '{continuation}': run it "
-                         "without workers")
+                         f"without {said_by}")
     places = frequencies
     if _word(values, "sweep%parameter") not in ("", "frequency"):
         listed = values.get("sweep%values", [])
@@ -128,8 +138,8 @@ def _plan(values: dict[str, list[str]], frequencies: NDArray[np.float64]) -> _Pl
             int(_word(values, "sweep%n_points")))
     steps = np.diff(places)
     if not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise InputError("workers: a sweep in pieces goes up or down all the way; this one does "
-                         "neither (sweep%values): sort them, or run it without workers")
+        raise InputError(f"{said_by}: a sweep in pieces goes up or down all the way; this one does "
+                         "neither (sweep%values): sort them, or run it without " + said_by)
     return _Plan(places, tolerance_of(values))
 
 
@@ -164,11 +174,11 @@ class _Watch:
         return self.ended
 
 
-def _solve(work: Callable[..., list[Part]], plan: _Plan, pool: Pool, watch: _Watch
-           ) -> tuple[list[Part], list[str]]:
-    """Parts in the order of the sweep that agree with each other, and where they did not."""
-    wanted = cut(len(plan.places), pool.workers)
-    parts: dict[Piece, Part] = {}
+def _solve(work: Callable[..., list[Part]], plan: _Plan, pool: Pool, watch: _Watch,
+           known: list[Part], wanted: list[Piece]) -> tuple[list[Part], list[str]]:
+    """Parts in the order of the sweep that agree with each other, those that are known and those
+    that are wanted, and where they did not."""
+    parts = {part.piece: part for part in known}
     remarks: list[str] = []
     while wanted and not watch.ended:
         for part in chain.from_iterable(pool.run(work, wanted, tick=watch.tick)):
@@ -229,11 +239,21 @@ class _WorkElsewhere:
         self._case = case
 
     def __call__(self, piece: Piece) -> list[Part]:
-        started = time.monotonic()
-        control = np.zeros(CONTROL, dtype=np.int64)
-        with self._case.open() as session:
-            status = session.run_piece(piece.solved, piece.lead, 0, control)
-            return [_part(session, piece, status, started)]
+        return [solve_piece(self._case, piece)]
+
+
+def solve_piece(case: Case, piece: Piece, progress: Progress | None = None,
+                is_stopped: Callable[[], object] | None = None) -> Part:
+    """A piece of a sweep in a session of its own, from points on the way to it."""
+    started = time.monotonic()
+    with case.open() as session, teller(progress, session) as tell:
+        status, received = run_watched(
+            lambda control: session.run_piece(piece.solved, piece.lead, 0, control), tell,
+            is_stopped)
+        part = _part(session, piece, status, started)
+    if received:
+        raise RunInterrupted(None)
+    return part
 
 
 def _part(session: Session, piece: Piece, status: int, started: float) -> Part:

@@ -17,7 +17,16 @@ from typing import Any, NoReturn
 from .. import __version__
 from .._progress import stages
 from .._words import near_options
-from .model import FullModel, ReducedModel, build_full, needs, reduce_model
+from ..errors import InputError
+from ..factors import ENGINES, chosen_engine
+from .model import (
+    FullModel,
+    ReducedModel,
+    build_full,
+    needs,
+    reduce_model,
+    reduced_system,
+)
 from .model_file import write_model
 from .parameters import (
     Discretisation,
@@ -52,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         return _run(options)
-    except ParameterError as error:
+    except (InputError, ParameterError) as error:
         print(f"fretwear.sector: {error}", file=sys.stderr)
         return _BAD_PARAMETER
     except OSError as error:
@@ -66,11 +75,13 @@ def _run(options: argparse.Namespace) -> int:
         # Said before the work, not after it.
         if not Path(target).absolute().parent.is_dir():
             raise FileNotFoundError(f"no folder to write {target} into")
+    chosen_engine(options.factor)   # refused before the work
     started = time.perf_counter()
     full = build_full(parameters, stages(quiet=options.quiet),
-                      None if options.quiet else _say_what_it_takes)
-    reduced = reduce_model(full)
-    mesh = recovery_mesh(full)[0] if options.mesh else None
+                      None if options.quiet else _say_what_it_takes, options.factor)
+    system = reduced_system(full)
+    reduced = reduce_model(full, system)
+    mesh = recovery_mesh(full, system)[0] if options.mesh else None
     write_model(reduced, options.output, options.title, mesh)
     if options.picture:
         from .picture import draw_sector  # matplotlib only where a picture is wanted
@@ -105,6 +116,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mesh", action="store_true",
                         help="also store the mesh and the displacement of its vertices, for "
                              "fretwear export where the generator is not at hand")
+    parser.add_argument("--factor", choices=ENGINES, default="auto",
+                        help="who factors the stiffness: the first of mumps, cholmod and superlu "
+                             "that is installed, or one of them by name (default auto)")
     parser.add_argument("--title", help="title stored in the file")
     parser.add_argument("-q", "--quiet", action="store_true", help="no summary")
     parser.add_argument("--version", action="version", version=f"fretwear {__version__}")

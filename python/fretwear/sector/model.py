@@ -154,9 +154,10 @@ def needs(n_dof: int, n_contact: int) -> tuple[float, float]:
 
 
 def build_full(parameters: SectorParameters, progress: Progress | None = None,
-               tell: Callable[[int, int], None] | None = None) -> FullModel:
-    """Mesh, assemble and factor the sector; `progress` is told how far that is, `tell` the degrees
-    of freedom and contact coordinates before the long work begins."""
+               tell: Callable[[int, int], None] | None = None,
+               engine: str = "auto") -> FullModel:
+    """Mesh, assemble and factor the sector by an engine of `fretwear.factors`; `progress` is told
+    how far that is, `tell` the degrees of freedom and contact coordinates before the long work."""
     sector = build_mesh(parameters)
     assembly = Assembly(sector.mesh, parameters.material)
     rows, tip = contact_rows(sector, parameters), tip_rows(sector, parameters.geometry)
@@ -175,15 +176,14 @@ def build_full(parameters: SectorParameters, progress: Progress | None = None,
         stiffness = sp.csr_array(stiffness + parameters.retention.retention * (lock.T @ lock))
     # The stiffness of an elastic half-space under a patch is of this order.
     kappa = parameters.material.young * np.sqrt(rows.area.mean())
-    # One attachment vector: that of the tip.
-    bonded = Bonded(stiffness, contact, kappa, progress, parameters.discretisation.n_modes + 1)
+    mass = restrict(sp.csr_array(sp.kron(scalar_mass, sp.identity(3))))
+    bonded = Bonded(stiffness, contact, kappa, progress, engine=engine, mass=mass)
     in_plane = np.array([1.0, 1.0, 0.0])
     centrifugal = ((scalar_mass @ assembly.nodes.T) * in_plane).ravel()[free]
     static = np.zeros(3 * assembly.n_nodes)
     static[free] = bonded.solve(centrifugal)
     rotation = restrict(assembly.geometric_stiffness(static)
                         - sp.kron(scalar_mass, sp.diags_array(in_plane)))
-    mass = restrict(sp.csr_array(sp.kron(scalar_mass, sp.identity(3))))
     return FullModel(parameters, sector, free, mass, stiffness, rotation, contact, centrifugal,
                      tip.normal[free], rows, tip, bonded)
 
@@ -204,9 +204,9 @@ def observed_rows(full: FullModel) -> Floats:
     return np.vstack((full.tip_force, full.tip.mean[:, full.free].toarray()))
 
 
-def reduce_model(full: FullModel) -> ReducedModel:
-    """Reduce to the coordinates of `reduced_system`."""
-    system = reduced_system(full)
+def reduce_model(full: FullModel, system: ReducedSystem | None = None) -> ReducedModel:
+    """Reduce to the coordinates of `reduced_system`, which is taken where it is there."""
+    system = system or reduced_system(full)
     rows, reduction = full.rows, system.reduction
     return ReducedModel(
         full.parameters, system.mass, system.stiffness, reduction.matrix(full.rotation),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..mesh import RecoveryMesh
+from ..reduction import ReducedSystem
 from .contact import flank_facets
 from .mesh import BLADE, DISK
 from .model import FullModel, observed_rows, reduced_system
@@ -19,7 +21,8 @@ Ints = NDArray[np.int64]
 VTK_ORDER = (7, 4, 1, 5, 6, 2, 0, 3)
 
 
-def recovery_mesh(full: FullModel) -> tuple[RecoveryMesh, Floats]:
+def recovery_mesh(full: FullModel,
+                  system: ReducedSystem | None = None) -> tuple[RecoveryMesh, Floats]:
     """Vertices and linear hexahedra of the sector, without the middle nodes of the elements.
 
     Returns
@@ -29,13 +32,15 @@ def recovery_mesh(full: FullModel) -> tuple[RecoveryMesh, Floats]:
     (n_observed, n_dof) array
         Observation matrix of the same reduction, to tell whether a model file belongs to it.
     """
-    reduction = reduced_system(full).reduction
+    reduction = (system or reduced_system(full)).reduction
     mesh = full.sector.mesh
     n_vertices = mesh.p.shape[1]
     # Degrees of freedom of the vertices come first in the numbering of the quadratic element.
-    basis = np.zeros((3 * n_vertices, reduction.basis.shape[1]))
     at_vertex = full.free < 3 * n_vertices
-    basis[full.free[at_vertex]] = reduction.basis[at_vertex]
+    rows = sp.csr_array((np.ones(int(at_vertex.sum())), (full.free[at_vertex],
+                                                         np.flatnonzero(at_vertex))),
+                        (3 * n_vertices, len(full.free)))
+    basis = reduction.row(rows, np.float32)
     facets, pairs = zip(*(flank_facets(full.sector, full.parameters, body)
                           for body in (BLADE, DISK)), strict=True)
     corners = cyclic_corners(mesh.p.T, mesh.facets[:, np.concatenate(facets)].T)

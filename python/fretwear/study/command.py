@@ -27,7 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, metavar="N",
                         help="runs at once on this machine (default: run.workers, else all cores)")
     parser.add_argument("--scheduler", metavar="WHERE",
-                        help="'threads', 'processes', 'dask' or the address of a Dask scheduler")
+                        help="'threads', 'processes', 'dask', the address of a Dask scheduler, or "
+                             "its scheduler file (.json)")
+    parser.add_argument("--part", metavar="K/N",
+                        help="the Kth of N parts of the runs alone, without a table (write it "
+                             "with --table-only afterwards)")
     parser.add_argument("--table-only", action="store_true",
                         help="run nothing; write the table from what is there")
     parser.add_argument("--quantities", action="store_true",
@@ -49,7 +53,10 @@ def main(options: argparse.Namespace) -> int:
     if options.scheduler is not None:
         plan = replace(plan, scheduler=options.scheduler)
     progress = None if options.quiet else _Lines().show
-    records = run_study(plan, progress, table_only=options.table_only)
+    part = None if options.part is None else _part(options.part)
+    if part is not None and options.table_only:
+        raise InputError("--part runs and writes no table, --table-only runs nothing: give one")
+    records = run_study(plan, progress, table_only=options.table_only, part=part)
     failed = [record for record in records if record is not None and record.exit_status != 0]
     for record in failed[:_LISTED]:
         print(f"fretwear study: {_values(record)}: {record.status} (exit status "
@@ -59,8 +66,18 @@ def main(options: argparse.Namespace) -> int:
               file=sys.stderr)
     if not options.quiet:
         done = sum(record is not None for record in records)
-        print(f"{plan.table}: {done} of {len(records)} runs, {len(failed)} failed")
+        where = plan.table if part is None else f"part {options.part}"
+        print(f"{where}: {done} of {len(records)} runs, {len(failed)} failed")
     return _SOME_FAILED if failed else 0
+
+
+def _part(text: str) -> tuple[int, int]:
+    """From K/N."""
+    k, slash, n = text.partition("/")
+    if not (slash and k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
+        raise InputError(f"--part {text}: expected K/N, such as 3/16 (the third of 16 parts), with "
+                         "1 <= K <= N")
+    return int(k), int(n)
 
 
 class _Lines:

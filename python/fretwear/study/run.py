@@ -7,16 +7,14 @@ repeats nothing that is there. Everything here can be sent to another process or
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
-import re
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from .._native import library_version
+from .._identity import digest, identity
 from ..case import Case
 from ..errors import FretwearError
 from .plan import Setting, override
@@ -27,11 +25,6 @@ __all__ = ["STATUS", "Job", "JobStopped", "Record", "identify", "keep", "recorde
 STATUS = {0: "ok", 3: "bad input", 4: "not converged"}
 #: Runs that ended so would end so again.
 _FINAL = ("ok", "not converged")
-#: How a key begins in the effective input.
-_BEGINNING = re.compile(r"   (\w+) = ")
-#: What does not change the numbers of a run, or counts by its content.
-_INDIFFERENT = ("case%threads", "case%title", "output%file", "model%file", "contact%worn")
-
 
 class JobStopped(Exception):
     """A run was stopped from outside; nothing is recorded of it."""
@@ -113,31 +106,12 @@ def identify(program: str, case: Path, folder: Path, values: Mapping[str, Settin
             override(key, value) for key, value in settings.items())
         with whole.open() as session:
             session.check()
-            effective = _effective(session.text("namelist"))
-            inputs = session.text("inputs").splitlines()
+            name = identity(session, case)
     except FretwearError as error:
         given = (override(key, value) for key, value in settings.items())
-        return Record(_digest([text, *given]), dict(values), error.exit_status,
+        return Record(digest([text, *given]), dict(values), error.exit_status,
                       STATUS.get(error.exit_status, "failed"), str(error), 0.0, "")
-    # Of the namelist its effect counts, of every other file that is read what it holds.
-    contents = [_content(Path(path)) for path in inputs if Path(path) != case]
-    name = _digest([library_version(), effective, *contents])
     return Job(name, program, str(case), str(folder), dict(values), settings, timeout)
-
-
-def _effective(namelist: str) -> str:
-    """The effective input without what does not change the numbers of a run."""
-    kept, group, skips = [], "", False
-    for line in namelist.splitlines():
-        if line.startswith("&"):
-            group = line[1:].strip()
-        found = _BEGINNING.match(line)
-        # Long values go on in lines of their own.
-        if found or line.startswith(("&", "/")):
-            skips = found is not None and f"{group}%{found[1]}" in _INDIFFERENT
-        if not skips:
-            kept.append(line)
-    return "\n".join(kept)
 
 
 def recorded(job: Job) -> Record | None:
@@ -149,19 +123,6 @@ def recorded(job: Job) -> Record | None:
         return None
     kept = record.status in _FINAL and job.result.is_file()
     return record if kept else None
-
-
-def _content(path: Path) -> str:
-    """Digest of a file."""
-    return _digest([path.read_bytes()])
-
-
-def _digest(parts: Iterable[str | bytes]) -> str:
-    whole = hashlib.sha256()
-    for part in parts:
-        whole.update(part.encode() if isinstance(part, str) else part)
-        whole.update(b"\0")
-    return whole.hexdigest()[:20]
 
 
 def _record_path(job: Job) -> Path:

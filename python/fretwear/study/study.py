@@ -19,7 +19,8 @@ Progress = Callable[[int, int, Record, bool], None]
 
 
 def run_study(plan: Plan, progress: Progress | None = None, *,
-              table_only: bool = False) -> list[Record | None]:
+              table_only: bool = False,
+              part: tuple[int, int] | None = None) -> list[Record | None]:
     """Run what is missing, and write the table.
 
     Parameters
@@ -30,6 +31,8 @@ def run_study(plan: Plan, progress: Progress | None = None, *,
         Told of every point.
     table_only : bool
         Run nothing.
+    part : tuple of int, optional
+        (K, N): every Nth point from the Kth, and no table.
 
     Returns
     -------
@@ -43,7 +46,10 @@ def run_study(plan: Plan, progress: Progress | None = None, *,
     KeyboardInterrupt
         Ctrl-C; the runs that were complete are kept, and stand in the table.
     """
-    need_writer(plan.table)
+    if part is None:
+        need_writer(plan.table)
+    else:
+        plan = replace(plan, points=plan.points[part[0] - 1::part[1]])
     by_program = bool(plan.program) or plan.scheduler == "processes"
     program = find_program(plan.program) if by_program else ""
     workers = plan.workers or core_count()
@@ -85,7 +91,8 @@ def run_study(plan: Plan, progress: Progress | None = None, *,
             if ended is not None:
                 for k in points[job.name]:
                     records[k] = replace(ended, values=plan.points[k])
-        write_table(build_table(plan, records), plan.table, plan.path.stem)
+        if part is None:
+            write_table(build_table(plan, records), plan.table, plan.path.stem)
     return records
 
 
