@@ -27,6 +27,8 @@ module fw_continuation
       !> First step as a share of the interval.
       real(wp) :: step = 0.01_wp
       integer :: max_points = 1000
+      !> Values of p where the equations turn a corner: a point lies on each.
+      real(wp), allocatable :: corner(:)
       !> Why the branch ended.
       character(:), allocatable :: ending
       logical :: ended = .false.
@@ -197,18 +199,21 @@ contains
       if (done) call self%trail%forget()
    end subroutine pass_over
 
-   !> A step has come to `ahead`: it is the next point, unless a fold or a bound lies before it.
+   !> A step has come to `passed`: it is the next point, unless a corner of the equations, a fold or
+   !> a bound lies before it.
    !> A fold between the two is given out first and `ahead` waits: `next` gives it out afterwards.
-   subroutine settle(self, system, ahead, point, error)
+   subroutine settle(self, system, passed, point, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
-      type(branch_point), intent(in) :: ahead
+      type(branch_point), intent(in) :: passed
       type(branch_point), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: before
+      type(branch_point) :: before, ahead
       real(wp) :: bound
 
       before = self%here
+      call stop_at_corner(self, system, passed, ahead, error)
+      if (allocated(error)) return
       ! Outside of both bounds: the one on whose side it lies.
       if ((ahead%p - self%start)*(ahead%p - self%finish) > 0.0_wp) then
          bound = merge(self%start, self%finish, (ahead%p - self%start)*(self%finish - &
@@ -235,6 +240,45 @@ contains
       point = self%waiting
       call pass(self, point)
    end subroutine settle
+
+   !> The first corner between the last point and one that was reached, if there is any.
+   subroutine stop_at_corner(self, system, passed, ahead, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: passed
+      type(branch_point), intent(out) :: ahead
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: landed
+      real(wp) :: corner, r(system%n)
+      integer :: k
+      logical :: found
+
+      ahead = passed
+      if (.not. allocated(self%corner)) return
+      found = .false.
+      corner = passed%p
+      associate (here => self%here%p, least => round_off*abs(self%finish - self%start))
+         do k = 1, size(self%corner)
+            if ((self%corner(k) - here)*(self%corner(k) - corner) >= 0.0_wp) cycle
+            if (min(abs(self%corner(k) - here), abs(self%corner(k) - corner)) <= least) cycle
+            corner = self%corner(k)
+            found = .true.
+         end do
+      end associate
+      if (.not. found) return
+      call land(self%corrector, system, self%here, passed, corner, landed, error)
+      if (allocated(error)) return
+      if (landed%report%converged) then
+         call self%forget_ahead()
+         ahead = landed
+      else
+         ! What follows takes the system and its factors at the point.
+         call system%set_parameter(passed%p, error)
+         if (allocated(error)) return
+         call system%residual(passed%x, r)
+         call self%corrector%linear%prepare(system, found)
+      end if
+   end subroutine stop_at_corner
 
    !> Count a point and see whether the branch runs away.
    subroutine pass(self, point)
