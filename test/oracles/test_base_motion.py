@@ -366,12 +366,15 @@ def test_a_table_scales_the_load(tmp_path, continuation):
 
 
 @pytest.mark.parametrize("ends", [(0.5, 1.5), (1.5, 0.5)])
-@pytest.mark.parametrize("control", [False, True])
-def test_a_branch_has_a_row_at_every_point_of_a_table(tmp_path, ends, control):
+@pytest.mark.parametrize(("control", "spring"), [(False, True), (True, True), (True, False)])
+def test_a_branch_has_a_row_at_every_point_of_a_table(tmp_path, ends, control, spring):
     """A corner of the response lies between no two rows, whichever way the curve goes."""
     points = (0.5, 0.71, 0.93, 1.0, 1.5)
     case = table(points, (1.0, 0.4, 1.1, 0.6, 2.0), start=ends[0], end=ends[1],
                  continuation="arclength", n_points=4)
+    # What is linear is no curve to be followed, unless its amplitude is given.
+    if spring:
+        case["spring"] = {"n_springs": 1, "side_1": 1, "coefficient": 5e-4, "power": 3}
     if control:
         case["control"] = {"amplitude": 0.5}
     found = run_case(tmp_path, case)
