@@ -2,14 +2,14 @@
 !> linear state: what fw_joint_modes finds of other structures.
 module fw_sector_modes
    use fw_body, only: body_type
-   use fw_cyclic_data, only: nodal_matrices, speed_matrices
+   use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type
    use fw_hermitian, only: is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_laws, only: build_law
    use fw_modes, only: least_width, mode_type
    use fw_pair_law, only: pair_law
-   use fw_sector, only: add_sector_spring, sector_at, sector_rows
+   use fw_sector, only: add_sector_spring, sector_at, sector_rows, sector_speed, speed_at
    use fw_whirl_modes, only: find_whirl, most_whirling, wave_matrices, wave_of
    implicit none (type, external)
    private
@@ -105,6 +105,7 @@ contains
       real(wp), intent(in) :: range(2)
       type(mode_type), allocatable, intent(inout) :: modes(:)
       type(wave_matrices) :: wave
+      type(sector_speed) :: speed
       complex(wp), allocatable :: root(:), right(:, :), left(:, :), load(:), observe(:, :)
       complex(wp) :: slope
       integer, allocatable :: chosen(:)
@@ -114,8 +115,10 @@ contains
       if (size(nodal%mass, 1) > most_whirling) return
       conjugated = case%model%cyclic%nodal_diameter(harmonic) < 0
       call wave_of(nodal, nodal%stiffness, conjugated, wave)
-      if (allocated(case%model%cyclic%speed)) call follow_speed(case%model%cyclic%speed, harmonic, &
-                                                                wave)
+      if (allocated(case%model%cyclic%speed)) then
+         call speed_at(case%model, abs(case%model%cyclic%nodal_diameter(harmonic)), speed)
+         call follow_speed(speed, harmonic, conjugated, wave)
+      end if
       call find_whirl(wave, root, right, left)
       load = load_in(nodal, harmonic, conjugated, 0.5_wp*sum(range))
       observe = nodal%observe
@@ -142,19 +145,31 @@ contains
 
    !> Critical speeds: with lambda = i n omega and Omega = omega/p the forces of the speed are some
    !> of lambda and of its square.
-   pure subroutine follow_speed(speed, harmonic, wave)
-      type(speed_matrices), intent(in) :: speed
+   pure subroutine follow_speed(speed, harmonic, conjugated, wave)
+      type(sector_speed), intent(in) :: speed
       integer, intent(in) :: harmonic
+      logical, intent(in) :: conjugated
       type(wave_matrices), intent(inout) :: wave
+      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
       real(wp) :: np
 
       np = harmonic*speed%order
-      if (allocated(speed%coriolis)) wave%mass = wave%mass - cmplx(0.0_wp, speed%coriolis/np, wp)
-      if (allocated(speed%circulatory)) wave%damping = wave%damping - &
-         cmplx(0.0_wp, speed%circulatory/np, wp)
-      if (allocated(speed%stiffness)) wave%mass = wave%mass - speed%stiffness/np**2
-      if (allocated(speed%structural)) wave%mass = wave%mass - &
-         cmplx(0.0_wp, speed%structural/np**2, wp)
+      if (allocated(speed%coriolis)) wave%mass = wave%mass - i*turned(speed%coriolis)/np
+      if (allocated(speed%circulatory)) wave%damping = wave%damping - i*turned(speed%circulatory)/np
+      if (allocated(speed%stiffness)) wave%mass = wave%mass - turned(speed%stiffness)/np**2
+      if (allocated(speed%structural)) wave%mass = wave%mass - i*turned(speed%structural)/np**2
+
+   contains
+
+      !> As it acts on the wave.
+      pure function turned(matrix)
+         complex(wp), intent(in) :: matrix(:, :)
+         complex(wp) :: turned(size(matrix, 1), size(matrix, 2))
+
+         turned = matrix
+         if (conjugated) turned = conjg(matrix)
+      end function turned
+
    end subroutine follow_speed
 
    !> Linear springs, and what the contact holds.

@@ -370,14 +370,18 @@ contains
       if (options%rotation_speed > 0.0_wp) then
          reason = 'does not go with model%rotation_speed: the speed follows the frequency; '// &
                   'keep one of the two'
-      else if (model%cyclic%has_sectors()) then
-         reason = 'does not go with &cyclic: give model%rotation_speed, speed by speed'
+      else if (model%cyclic%is_mistuned) then
+         reason = 'does not go with cyclic%mistuned: give model%rotation_speed, speed by speed'
+      else if (allocated(raw%cyclic%nodal)) then
+         reason = 'does not go with matrices of nodal diameters: give those of a sector, with '// &
+                  'stiffness_rotation and coriolis'
       else if (.not. rotates(raw)) then
          reason = 'is given, but nothing of the model depends on the rotation speed '// &
                   '(stiffness_rotation, coriolis, circulatory, load static_rotation): remove it'
-      else if (options%modal_damping > 0.0_wp .and. allocated(raw%stiffness_rotation)) then
+      else if (options%modal_damping > 0.0_wp .and. (model%cyclic%has_sectors() &
+               .or. allocated(raw%stiffness_rotation))) then
          reason = 'does not go with model%modal_damping, whose modes would change with '// &
-                  'stiffness_rotation: give damping, or rayleigh_stiffness'
+                  'the speed: give damping, or rayleigh_stiffness'
       end if
       if (allocated(reason)) call reader%refuse('sweep', 'speed_order', reason)
    end subroutine check_speed_order

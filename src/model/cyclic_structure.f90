@@ -10,7 +10,7 @@ module fw_cyclic_structure
    use fw_formed_stiffness, only: formed_stiffness
    use fw_kinds, only: wp
    use fw_model, only: model_type
-   use fw_sector, only: sector_at
+   use fw_sector, only: sector_at, sector_speed, speed_at
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
    use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, &
@@ -123,6 +123,7 @@ contains
       type(cyclic_structure), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices), allocatable :: nodal(:)
+      type(sector_speed) :: speed
       integer, allocatable :: used(:), slot(:)
       integer :: h, j, n_kept
 
@@ -136,7 +137,6 @@ contains
          if (allocated(error)) return
          if (allocated(model%cyclic%speed)) then
             call self%basis(j)%keep_dofs(used(j), size(nodal(j)%mass, 1), relative%at(used(j) + 1))
-            call self%basis(j)%take_speed(model%cyclic%speed)
             cycle
          end if
          call self%basis(j)%find_modes(used(j), nodal(j), relative%at(used(j) + 1), error)
@@ -167,7 +167,12 @@ contains
          n_kept = n_kept + size(self%basis(j)%kept)
          ! Numbers that tell nodal diameters apart too.
          self%kept = [self%kept, used(j)*most_modes + self%basis(j)%kept]
-         call self%basis(j)%transform(nodal(j), slot, self%n_coordinates)
+         if (allocated(model%cyclic%speed)) then
+            call speed_at(model, used(j), speed)
+            call self%basis(j)%transform(nodal(j), slot, self%n_coordinates, speed)
+         else
+            call self%basis(j)%transform(nodal(j), slot, self%n_coordinates)
+         end if
       end do
    end subroutine find_bases
 
@@ -451,8 +456,8 @@ contains
                                state%load_factor(h), amplitude(:, h), slopes(:, h))
             if (parameter /= by_frequency) cycle
             if (allocated(self%basis(self%basis_of(h))%speed)) call add_speed_slope( &
-               self%basis(self%basis_of(h))%speed, self%harmonic(h), state%omega, &
-               state%load_factor(h), amplitude(:, h), slopes(:, h))
+               self%basis(self%basis_of(h))%speed, self%harmonic(h), self%conjugated(h), &
+               state%omega, state%load_factor(h), amplitude(:, h), slopes(:, h))
          end do
       end select
       call coefficients_of(self%harmonic, self%column, m, m, slopes, slope)

@@ -15,7 +15,14 @@ module fw_sector
    implicit none (type, external)
    private
 
-   public :: sector_at, sector_rows, damp_modes, add_sector_spring
+   public :: sector_at, sector_rows, damp_modes, add_sector_spring, sector_speed, speed_at
+
+   !> What a rotation speed that follows the frequency adds to a tied sector, see speed_matrices.
+   type :: sector_speed
+      real(wp) :: order = 0.0_wp
+      complex(wp), allocatable :: coriolis(:, :), circulatory(:, :), stiffness(:, :), &
+                                  damping(:, :), structural(:, :), load(:)
+   end type sector_speed
 
 contains
 
@@ -54,6 +61,31 @@ contains
          call damp_modes(model%cyclic%modal_damping, nodal, error)
       end if
    end subroutine sector_at
+
+   !> What follows the frequency in nodal diameter k = 0 .. N/2.
+   pure subroutine speed_at(model, k, speed)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      type(sector_speed), intent(out) :: speed
+      complex(wp) :: turn(model%n_dof)
+      integer :: place(model%n_dof), i, n
+
+      call tie_sector(model, k, place, turn, n)
+      associate (given => model%cyclic%speed)
+         speed%order = given%order
+         if (allocated(given%coriolis)) speed%coriolis = tied(given%coriolis, place, turn, n)
+         if (allocated(given%circulatory)) speed%circulatory = tied(given%circulatory, place, &
+                                                                    turn, n)
+         if (allocated(given%stiffness)) speed%stiffness = tied(given%stiffness, place, turn, n)
+         if (allocated(given%damping)) speed%damping = tied(given%damping, place, turn, n)
+         if (allocated(given%structural)) speed%structural = tied(given%structural, place, turn, n)
+         if (.not. allocated(given%load)) return
+         allocate (speed%load(n), source=(0.0_wp, 0.0_wp))
+         do i = 1, model%n_dof
+            speed%load(place(i)) = speed%load(place(i)) + conjg(turn(i))*given%load(i)
+         end do
+      end associate
+   end subroutine speed_at
 
    !> The stiffness of the air for the waves in both directions; their matrices are not alike, but
    !> T of -k is the conjugate of T of k. Zero where the model does not say it.

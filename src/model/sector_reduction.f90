@@ -6,12 +6,13 @@
 !> (a row that depends on others there, a mode kept of another nodal diameter) is padded: a spring
 !> of its own that nothing loads.
 module fw_sector_reduction
-   use fw_cyclic_data, only: nodal_matrices, speed_matrices
+   use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hermitian, only: cholesky, congruence, product_of, is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_lapack, only: zpotrs
    use fw_load_waves, only: load_waves
+   use fw_sector, only: sector_speed
    use fw_sector_relative, only: sector_relative
    use fw_text, only: to_text
    implicit none (type, external)
@@ -44,7 +45,7 @@ module fw_sector_reduction
       complex(wp), allocatable :: circulatory(:, :), structural(:, :)
       !> What a rotation speed that follows the frequency adds, in the coordinates: nothing is
       !> condensed then.
-      type(speed_matrices), allocatable :: speed
+      type(sector_speed), allocatable :: speed
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       complex(wp), allocatable :: observe_q(:, :), observe_i(:, :)
       !> Coordinates that this nodal diameter does not have (n_coordinates).
@@ -58,7 +59,6 @@ module fw_sector_reduction
       procedure :: keep_resonances
       procedure :: keep_all
       procedure :: keep_dofs
-      procedure :: take_speed
       procedure :: keep_of_mode
       procedure :: transform
       procedure :: pushes_free_mode
@@ -230,14 +230,12 @@ contains
       call move_to_coordinates(self, spread(.true., 1, self%n_internal))
    end subroutine keep_dofs
 
-   !> Take what follows the frequency to the coordinates; before `transform`, which forgets the
-   !> basis. Of one sector, whose basis is real.
-   subroutine take_speed(self, speed)
+   !> Take what follows the frequency to the coordinates, which have their places in `t`.
+   subroutine take_speed(self, speed, t)
       class(sector_reduction), intent(inout) :: self
-      type(speed_matrices), intent(in) :: speed
-      real(wp), allocatable :: t(:, :)
+      type(sector_speed), intent(in) :: speed
+      complex(wp), intent(in) :: t(:, :)
 
-      t = real(self%t_q, wp)
       allocate (self%speed)
       self%speed%order = speed%order
       call take(speed%coriolis, self%speed%coriolis)
@@ -245,15 +243,15 @@ contains
       call take(speed%stiffness, self%speed%stiffness)
       call take(speed%damping, self%speed%damping)
       call take(speed%structural, self%speed%structural)
-      if (allocated(speed%load)) self%speed%load = matmul(speed%load, t)
+      if (allocated(speed%load)) self%speed%load = matmul(speed%load, conjg(t))
 
    contains
 
       subroutine take(matrix, reduced)
-         real(wp), allocatable, intent(in) :: matrix(:, :)
-         real(wp), allocatable, intent(inout) :: reduced(:, :)
+         complex(wp), allocatable, intent(in) :: matrix(:, :)
+         complex(wp), allocatable, intent(inout) :: reduced(:, :)
 
-         if (allocated(matrix)) reduced = matmul(transpose(t), matmul(matrix, t))
+         if (allocated(matrix)) reduced = congruence(t, matrix, t)
       end subroutine take
 
    end subroutine take_speed
@@ -296,12 +294,14 @@ contains
    end function pushes_free_mode
 
    !> All blocks in the basis, with coordinates at the places that all nodal diameters share.
-   subroutine transform(self, nodal, slot, n_coordinates)
+   subroutine transform(self, nodal, slot, n_coordinates, speed)
       class(sector_reduction), intent(inout) :: self
       type(nodal_matrices), intent(in) :: nodal
       !> Place of each coordinate of this nodal diameter, kept modes behind the relative ones.
       integer, intent(in) :: slot(:)
       integer, intent(in) :: n_coordinates
+      !> What follows the frequency, with which nothing is condensed.
+      type(sector_speed), intent(in), optional :: speed
       complex(wp), allocatable :: t_q(:, :)
       integer :: j
 
@@ -326,6 +326,7 @@ contains
       self%observe_q = product_of(nodal%observe, self%t_q)
       self%observe_i = product_of(nodal%observe, self%t_i)
       if (nodal%has_whirl()) call take_whirl(nodal, self)
+      if (present(speed)) call take_speed(self, speed, self%t_q)
       deallocate (self%t_q, self%t_i)
    end subroutine transform
 

@@ -45,8 +45,8 @@ contains
       allocate (d(size(u), size(u)), source=(0.0_wp, 0.0_wp))
       if (allocated(basis%structural)) d = basis%structural
       if (point%conjugated) d = conjg(d)
-      if (allocated(basis%speed)) call add_multiple(basis%speed%structural, cmplx( &
-         (omega/basis%speed%order)**2, kind=wp), d)
+      if (allocated(basis%speed)) call add_multiple(basis%speed%structural, &
+         point%conjugated, cmplx((omega/basis%speed%order)**2, kind=wp), d)
       work = point%harmonic*pi*real(dot_product(u, matmul(d, u)), wp)
    end function structural_work_of
 
