@@ -122,9 +122,11 @@ def accepts(key: dict[str, Any]) -> str:
         words = ", ".join(f"`'{word}'`" for word in key["words"])
         return f"{words}; one or {key['shape']}" if "shape" in key else words
     if kind in ("text", "list"):
-        return "text" if kind == "text" else key["accepts"]
+        return "text" if kind == "text" else coded(key["accepts"])
     if kind == "logical":
         return "`.true.`, `.false.`"
+    if key.get("whole"):
+        kind = "whole number"
     text = f"{kind}s" if "shape" in key else kind
     if bounds := range_text(key):
         text = bounds if "shape" not in key else f"{text} {bounds}"

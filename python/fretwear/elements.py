@@ -70,6 +70,39 @@ class Polynomial(Elements):
     of: str = "energy"
     dof: ArrayLike | None = None
 
+    @classmethod
+    def from_tensors(cls, dofs: ArrayLike, quadratic: ArrayLike | None = None,
+                     cubic: ArrayLike | None = None) -> Polynomial:
+        """Forces of full tensors, ``f_i = q_ijk u_j u_k + c_ijkl u_j u_k u_l``, term by term.
+
+        Parameters
+        ----------
+        dofs : (n,) int
+            Signed dofs, counted from 1, that the tensors are of.
+        quadratic : (n, n, n) float, optional
+            q, of any symmetry or none.
+        cubic : (n, n, n, n) float, optional
+            c.
+        """
+        numbers = np.asarray(dofs)
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu" or not numbers.all():
+            raise InputError("polynomial.dofs: must be a list of dof numbers, none of them 0")
+        n = len(numbers)
+        summed: dict[tuple[int, ...], float] = {}
+        for name, tensor, rank in (("quadratic", quadratic, 3), ("cubic", cubic, 4)):
+            if tensor is None:
+                continue
+            values = array(f"polynomial.{name}", tensor, (n,) * rank)
+            # What differs by the order of the factors alone is one term.
+            for at in zip(*np.nonzero(values), strict=True):
+                row, *columns = (int(k) for k in at)
+                key = (row, *sorted(columns))
+                summed[key] = summed.get(key, 0.0) + float(values[at])
+        terms = [(key, value) for key, value in sorted(summed.items()) if value]
+        return cls([[int(numbers[k]) for k in key[1:]] for key, _ in terms],
+                   [value for _, value in terms], "force",
+                   np.array([int(numbers[key[0]]) for key, _ in terms], dtype=np.int32))
+
     def checked(self, n_dof: int) -> Polynomial:
         """The same with arrays, factors (n_terms, 8)."""
         if self.of not in ("energy", "force"):

@@ -121,7 +121,8 @@ class Resonance(_Resonance, total=False):
                        "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
                        "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
                        "contact%normal_coefficient", "contact%reference_force",
-                       "polynomial%coefficient", "damper%coefficient", "model%loss_factor"]
+                       "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
+                       "contact%slip_speed", "contact%mu_dynamic"]
     #: first value, or factor; only: analysis = 'resonance' (required, else 0)
     start: float
     #: last value, or factor; only: analysis = 'resonance' (required, else 0)
@@ -269,7 +270,8 @@ class Contact(TypedDict, total=False):
     #: others; only: law = 'penalty', 'regularised' (default: of the file, else required with
     #: 'power')
     normal_coefficient: ArrayLike
-    #: e of normal_law = 'power': 1.5 Hertz; only: law = 'penalty', 'regularised' (default: 1.5)
+    #: e of normal_law = 'power': 1.5 Hertz; only: law = 'penalty', 'regularised' (default: of the
+    #: file, else 1.5)
     normal_exponent: ArrayLike
     #: [F] p_0 of normal_law = 'exponential', pressure p_0 exp(d/h); 0 for pairs of others; only:
     #: law = 'penalty', 'regularised' (default: of the file, else required with 'exponential')
@@ -278,33 +280,36 @@ class Contact(TypedDict, total=False):
     #: 'regularised' (default: of the file, else required with 'exponential')
     decay_length: ArrayLike
     #: [L/s] sliding velocity du/dt at which tanh(1) = 76 % of the friction acts; only: law =
-    #: 'regularised' (required with tangential dofs)
+    #: 'regularised' (default: of the file, else required with tangential dofs)
     slip_speed: ArrayLike
     #: friction coefficient of fast sliding, to which mu falls; only: law = 'regularised' (default:
-    #: mu)
+    #: of the file, else mu)
     mu_dynamic: ArrayLike
-    #: [L/s] over which friction falls from mu to mu_dynamic; only: law = 'regularised' (required
-    #: with mu_dynamic)
+    #: [L/s] over which friction falls from mu to mu_dynamic; only: law = 'regularised' (default: of
+    #: the file, else required with mu_dynamic)
     weakening_speed: ArrayLike
-    #: of the speed in exp(-(v/weakening_speed)**e); only: law = 'regularised' (default: 1)
+    #: of the speed in exp(-(v/weakening_speed)**e); only: law = 'regularised' (default: of the
+    #: file, else 1)
     weakening_exponent: ArrayLike
-    #: [s/L] what mu gains with the sliding speed; only: law = 'regularised' (default: 0)
+    #: [s/L] what mu gains with the sliding speed; only: law = 'regularised' (default: of the file,
+    #: else 0)
     mu_viscous: ArrayLike
-    #: [L/s] velocity of side 2 along t1: a belt or a disk; only: law = 'regularised' (default: 0)
+    #: [L/s] velocity of side 2 along t1: a belt or a disk; only: law = 'regularised' (default: of
+    #: the file, else 0)
     speed_1: ArrayLike
-    #: [L/s] the same along t2; only: law = 'regularised' (default: 0)
+    #: [L/s] the same along t2; only: law = 'regularised' (default: of the file, else 0)
     speed_2: ArrayLike
     #: exponent of the sliding limits: the work of a small cycle grows with amplitude**(chi + 3);
-    #: only: law = 'iwan' (required with tangential dofs)
+    #: only: law = 'iwan' (default: of the file, else required with tangential dofs)
     iwan_chi: ArrayLike
     #: stiffness that is lost at once where the last elements slip, over that lost before; only: law
-    #: = 'iwan' (default: 0)
+    #: = 'iwan' (default: of the file, else 0)
     iwan_beta: ArrayLike
     #: n of abs(z)**n, 1 or 2: how sharply the force turns to its limit; only: law = 'bouc_wen'
-    #: (default: 1)
+    #: (default: of the file, else 1)
     bouc_wen_exponent: ArrayLike
     #: shape of the loops: 0.5 unloads with the tangential stiffness, 1 with twice of it from the
-    #: limit; only: law = 'bouc_wen' (default: 0.5)
+    #: limit; only: law = 'bouc_wen' (default: of the file, else 0.5)
     bouc_wen_beta: ArrayLike
     #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity', 'rigid'
     #: (default: 1)
@@ -404,8 +409,8 @@ class Load(TypedDict, total=False):
     #: points of a table by which all vibratory loads are multiplied; 0 switches that of a file off
     #: (default: of the file, else 0)
     n_table: int
-    #: [rad/s] where the table has points, rising; linear between them, refused beyond (default: of
-    #: the file, else required with n_table)
+    #: [rad/s] where the table has points, whatever sweep%unit, rising; linear between them, refused
+    #: beyond (default: of the file, else required with n_table)
     table_frequency: ArrayLike
     #: factor of the loads there (default: of the file, else required with n_table)
     table_scale: ArrayLike
@@ -482,7 +487,8 @@ class Sweep(_Sweep, total=False):
                        "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
                        "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
                        "contact%normal_coefficient", "contact%reference_force",
-                       "polynomial%coefficient", "damper%coefficient", "model%loss_factor"]
+                       "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
+                       "contact%slip_speed", "contact%mu_dynamic"]
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)

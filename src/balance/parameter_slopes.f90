@@ -6,6 +6,8 @@
 !>   k_t, k_n       dy = y/k
 !>   c, p_0         of curved normal laws, dy_n = -p/(p' c): the pressure is in proportion to them,
 !>                  and T to mu p, so that dy_n = -p/(p' mu) by mu
+!>   v_0, mu_d      of friction at a sliding speed, and mu where it weakens with the speed: dT with
+!>                  the inputs held
 !>   coefficient    the force of a unit coefficient
 !>   loads, matrices    dr = d(Z q - F)/dp, which laws that take the balance lose from their input.
 !>
@@ -22,7 +24,8 @@ module fw_parameter_slopes
    use fw_lapack, only: dgemv
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
       is_of_matrices, is_per_pair, normal_coefficient, normal_load, normal_stiffness, &
-      parameter_group, reference_force, spring_coefficient, static_scale, tangential_stiffness
+      parameter_group, parameter_key, reference_force, spring_coefficient, static_scale, &
+      tangential_stiffness
    use fw_recovery, only: observe
    implicit none (type, external)
    private
@@ -205,12 +208,18 @@ contains
       type(parameter_entry), intent(in) :: parameter
       type(parameter_slope), intent(inout) :: slope
       real(wp) :: input(self%fourier%n_coefficients, 3), output(self%fourier%n_coefficients, 3)
+      character(24) :: key
+      logical :: is_known
       integer :: c, i
 
       i = parameter%element
       associate (pairs => state%problem%forces%pairs, p => self%law%prediction, work => self%work)
-         call input_of(self, state, parameter, input)
-         call multiply_twin(work, i, input, output)
+         call parameter_key(parameter%number, key)
+         call self%law%by_constant(i, trim(key), self%fourier, work, output, is_known)
+         if (.not. is_known) then
+            call input_of(self, state, parameter, input)
+            call multiply_twin(work, i, input, output)
+         end if
          ! mu acts on friction alone, and not on what presses.
          if (parameter%number == friction_coefficient) output(:, 3) = 0.0_wp
          do c = 1, 3

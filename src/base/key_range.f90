@@ -10,7 +10,7 @@ module fw_key_range
    private
 
    public :: range_type
-   public :: above, at_least, at_most, below, from_to, dof_numbers
+   public :: above, at_least, at_most, below, from_to, dof_numbers, whole
    public :: operator(.and.)
 
    !> What a number may be; a bound that is huge does not bind.
@@ -22,6 +22,8 @@ module fw_key_range
       !> Name of the size that bounds the number on either side of 0, or blank.
       !> The bound itself is known only with the model, so the reader tests it, not `holds`.
       character(12) :: within = ''
+      !> Whether a real has to be a whole number.
+      logical :: whole = .false.
    contains
       procedure :: holds
    end type range_type
@@ -98,6 +100,14 @@ contains
       range%within = 'n_dof'
    end function dof_numbers
 
+   !> Both ends included, and nothing between whole numbers.
+   pure type(range_type) function whole(least, most) result(range)
+      integer, intent(in) :: least, most
+
+      range = from_to_integer(least, most)
+      range%whole = .true.
+   end function whole
+
    !> The narrower of each bound; the name of a size is the first one's.
    pure type(range_type) function both(first, second) result(range)
       type(range_type), intent(in) :: first, second
@@ -107,6 +117,7 @@ contains
       range%least = max(first%least, second%least)
       range%most = min(first%most, second%most)
       range%within = first%within
+      range%whole = first%whole .or. second%whole
    end function both
 
    !> Whether a number is in the range, `within` aside.
@@ -118,6 +129,7 @@ contains
       holds = ieee_is_finite(number)
       if (.not. holds) return
       holds = number > self%above .and. number >= self%least .and. number <= self%most
+      if (self%whole) holds = holds .and. abs(number - anint(number)) <= 0.0_wp
       ! Tested only where it binds: huge(1.0) itself is a number below no bound.
       if (self%below < huge(1.0_wp)) holds = holds .and. number < self%below
    end function holds

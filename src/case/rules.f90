@@ -179,17 +179,13 @@ module fw_rules
       rule_type('sweep%stability = .true.', 'a law without Floquet multipliers', &
                 "use contact%law = 'penalty'")]
 
-   !> Groups of elements that are neither pairs nor springs.
-   !> Loads of supports are those of stiffness, damping and mass; only pairs and springs are told of
-   !> what moves with them.
+   !> Loads of supports are those of stiffness, damping and mass.
    type(rule_type), parameter :: of_base(*) = [ &
       rule_type('group &base', hysteretic, 'use viscous damping, or give the load of the base'), &
       rule_type('group &base', matrices_alone, 'give the load that the base makes'), &
-      rule_type('group &base', 'sweep%speed_order', 'give model%rotation_speed'), &
-      rule_type('group &base', 'elements beside pairs and springs', &
-                'give the load that the base makes'), &
-      rule_type('group &base', stress, "set stress%output = 'none'")]
+      rule_type('group &base', 'sweep%speed_order', 'give model%rotation_speed')]
 
+   !> Groups of elements that are neither pairs nor springs.
    type(rule_type), parameter :: of_elements(*) = [ &
       rule_type('elements beside pairs and springs', "case%analysis = 'time'", &
                 "use 'frf' or 'point'"), &

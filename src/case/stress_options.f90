@@ -18,6 +18,8 @@ module fw_stress_options
       integer :: n_points = 0
       !> Six components after one another, point by point (6 n_points, n_dof) [force/length**3].
       real(wp), allocatable :: rows(:, :)
+      !> Where the base moves by 1 with what it carries (6 n_points); not allocated where none does.
+      real(wp), allocatable :: of_base(:)
       !> Without motion, and for each (rad/s)**2 of the rotation speed (6, n_points)
       !> [force/length**2].
       real(wp), allocatable :: static(:, :), static_rotation(:, :)
@@ -30,6 +32,7 @@ module fw_stress_options
    contains
       procedure :: bind_keys
       procedure :: take
+      procedure :: ride
       procedure :: is_wanted
       procedure :: writes_tensor
       procedure :: is_judged
@@ -81,6 +84,18 @@ contains
       if (allocated(parts%endurance)) self%endurance = parts%endurance
       if (allocated(parts%ultimate)) self%ultimate = parts%ultimate
    end subroutine take
+
+   !> Rows of the motion beside a base, whose supports stay where they are, and what it adds itself.
+   pure subroutine ride(self, dof, carried)
+      class(stress_options), intent(inout) :: self
+      !> Supports, and what moves with them (n_dof).
+      integer, intent(in) :: dof(:)
+      real(wp), intent(in) :: carried(:)
+
+      if (.not. allocated(self%rows)) return
+      self%of_base = matmul(self%rows, carried)
+      self%rows(:, abs(dof)) = 0.0_wp
+   end subroutine ride
 
    !> Whether there is any stress to find.
    pure logical function is_wanted(self)

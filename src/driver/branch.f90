@@ -216,7 +216,12 @@ contains
          curve%max_points = case%sweep%max_points
          curve%x_scale = displacement_scale(self%system)
          ! Of a structure that is taken whole, too: a pair that sticks leaves no unknowns there.
-         if (.not. case%over%is_wanted()) call find_poles(system, curve)
+         if (.not. case%over%is_wanted()) then
+            call find_poles(system, curve)
+            ! Between its points a table of the load is straight.
+            if (allocated(case%model%waves%table_frequency)) curve%corner = &
+               case%model%waves%table_frequency
+         end if
          curve%step = 1.0_wp/real(default_steps, wp)
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       end associate

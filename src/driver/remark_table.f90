@@ -54,6 +54,9 @@ module fw_remark_table
                   'the model file has stiffnesses that law does not take'), &
       remark_kind('no load', &
                   'no vibratory load acts'), &
+      remark_kind('another order', &
+                  'speed_order is neither engine_order nor its negative, nor one of these '// &
+                  'and a multiple of the number of sectors'), &
       remark_kind('accuracy chosen', &
                   'neither n_harmonics nor accuracy was given: a natural sweep or a point '// &
                   'with contact or nonlinear springs takes accuracy = 1e-2, where nothing '// &

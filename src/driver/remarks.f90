@@ -100,6 +100,7 @@ contains
          call remarks%add('no load', 'no vibratory load acts: the response is that at rest; '// &
                           'set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       end if
+      call remark_order(case, remarks)
       call remark_unstable(case, remarks)
       call remark_unused(case, remarks)
       call remark_reduction(case, remarks)
@@ -107,6 +108,25 @@ contains
       call remark_law(case, remarks)
       call remark_tail(case, remarks)
    end subroutine remark_input
+
+   !> A load at rest that a wave meets has the order that the speed has to the frequency.
+   subroutine remark_order(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      integer :: order
+
+      associate (cyclic => case%model%cyclic, speed_order => case%sweep%speed_order)
+         if (speed_order <= 0.0_wp .or. .not. cyclic%has_sectors()) return
+         order = nint(speed_order)
+         if (abs(speed_order - order) <= 0.0_wp .and. any( &
+             modulo([order - cyclic%engine_order, order + cyclic%engine_order], &
+                    cyclic%n_sectors) == 0)) return
+         call remarks%add('another order', 'sweep%speed_order = '//to_text(speed_order)// &
+            ' is not the order of the wave, cyclic%engine_order = '// &
+            to_text(cyclic%engine_order)//' of '//to_text(cyclic%n_sectors)// &
+            ' sectors: the load does not stand still')
+      end associate
+   end subroutine remark_order
 
    !> Forces across the motion, of bearings or seals, may feed it.
    subroutine remark_unstable(case, remarks)

@@ -59,6 +59,7 @@ contains
       call carry_solution(system, x, self%system, y)
       call observed_coefficients(self%system, y, n_harmonics, found)
       call add_static(case, point, found)
+      if (allocated(case%stress%of_base)) call add_base(case, point, found)
       if (self%grid%n_harmonics /= n_harmonics .or. .not. allocated(self%grid%waves)) then
          self%grid = new_stress_grid(n_harmonics)
       end if
@@ -126,6 +127,18 @@ contains
          coefficients(1, j*n + 1:(j + 1)*n) = coefficients(1, j*n + 1:(j + 1)*n) + static
       end do
    end subroutine add_static
+
+   !> What moves with the base is strained by it too (2H+1, 6 n_points).
+   pure subroutine add_base(case, point, coefficients)
+      type(case_type), intent(in) :: case
+      type(point_type), intent(in) :: point
+      real(wp), intent(inout) :: coefficients(:, :)
+      integer :: k
+
+      do k = 1, size(coefficients, 2)
+         coefficients(:, k) = coefficients(:, k) + case%stress%of_base(k)*point%base
+      end do
+   end subroutine add_base
 
    !> Amplitude, mean and utilisation of every point, of each sector where sectors differ.
    subroutine judge(case, grid, coefficients, stress)

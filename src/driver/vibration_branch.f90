@@ -133,6 +133,10 @@ contains
          curve%max_points = case%sweep%max_points
          curve%step = 1.0_wp/real(default_steps, wp)
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
+         ! Between its points a table of the load is straight.
+         if (allocated(case%model%waves%table_frequency) .and. .not. case%over%is_wanted()) then
+            curve%corner = case%model%waves%table_frequency
+         end if
          call self%strategy%v%begin_curve(self%amplitude(self%k), x, curve)
          call curve%begin(self%system, x, error)
       end associate

@@ -10,7 +10,7 @@ module fw_bouc_wen
    use fw_contact_data, only: contact_type
    use fw_displacement_path, only: anchor_type, displacement_path
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: at_least, at_most, operator(.and.)
+   use fw_key_range, only: at_least, at_most, operator(.and.), whole
    use fw_kinds, only: wp
    use fw_pair_law, only: tangential_stiffness_key
    use fw_path_law, only: path_facts, path_law
@@ -52,11 +52,12 @@ contains
       associate (unused => self, unused_closes => closes, constants => contact%constants)
          call constants%bind(keys, tangential_stiffness_key(), slides)
          call constants%bind(keys, key('bouc_wen_exponent', 'n of abs(z)**n, 1 or 2: how '// &
-            'sharply the force turns to its limit', at_least(1.0_wp) .and. at_most(2.0_wp), '', &
-            'n_pairs', absent='1'), .false.)
+            'sharply the force turns to its limit', whole(1, 2), '', 'n_pairs', &
+            absent='of the file, else 1'), .false.)
          call constants%bind(keys, key('bouc_wen_beta', 'shape of the loops: 0.5 unloads with '// &
             'the tangential stiffness, 1 with twice of it from the limit', &
-            at_least(0.5_wp) .and. at_most(1.0_wp), '', 'n_pairs', absent='0.5'), .false.)
+            at_least(0.5_wp) .and. at_most(1.0_wp), '', 'n_pairs', &
+            absent='of the file, else 0.5'), .false.)
       end associate
    end subroutine bind_keys
 

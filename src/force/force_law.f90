@@ -227,6 +227,7 @@ module fw_force_law
       procedure :: find_parameter
       procedure :: by_frequency
       procedure :: by_parameter
+      procedure :: by_constant
       procedure :: instants_wanted
    end type force_law
 
@@ -661,6 +662,25 @@ contains
                  unused_work => work)
       end associate
    end subroutine by_parameter
+
+   !> Derivative of the force of one element by a constant of it, named by its key, the inputs being
+   !> held, at the last evaluation; where `is_known` says no, the constant acts through the inputs.
+   pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      character(*), intent(in) :: name
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(in) :: work
+      !> (n_coefficients, n_components).
+      real(wp), intent(inout) :: force(:, :)
+      logical, intent(out) :: is_known
+
+      is_known = .false.
+      force = 0.0_wp
+      associate (unused => self, unused_element => element, unused_name => name, &
+                 unused_fourier => fourier, unused_work => work)
+      end associate
+   end subroutine by_constant
 
    !> Bound of the tangential inputs of each element, of three components.
    pure subroutine measure_scale(self)

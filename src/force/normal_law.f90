@@ -78,7 +78,7 @@ contains
             'pressure c d**e of the overclosure d; 0 for pairs of others', at_least(0.0_wp), &
             'F/L^e', 'n_pairs', absent="of the file, else required with 'power'"), presses)
          call constants%bind(keys, key('normal_exponent', "e of normal_law = 'power': 1.5 Hertz", &
-            at_least(1.0_wp), '', 'n_pairs', absent='1.5'), .false.)
+            at_least(1.0_wp), '', 'n_pairs', absent='of the file, else 1.5'), .false.)
          call constants%bind(keys, key('reference_force', "p_0 of normal_law = 'exponential', "// &
             'pressure p_0 exp(d/h); 0 for pairs of others', at_least(0.0_wp), 'F', 'n_pairs', &
             absent="of the file, else required with 'exponential'"), decays)

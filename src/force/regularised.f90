@@ -49,10 +49,15 @@ module fw_regularised
       procedure :: slope_at_rest
       procedure :: n_parameters
       procedure :: by_parameter
+      procedure :: by_constant
       procedure :: instants_wanted
       procedure :: at_instant
    end type regularised_law
 
+   !> Constants by which the forces have derivatives with their inputs held.
+   character(*), parameter :: constant_words(*) = [character(12) :: 'mu', 'slip_speed', &
+                                                   'mu_dynamic']
+   integer, parameter :: of_mu = 1, of_slip_speed = 2, of_mu_dynamic = 3
    !> Instants while a velocity of full swing passes from -v_0 to v_0, times pi: one in each half.
    real(wp), parameter :: instants_of_turn = 8.0_wp
    !> Sliding speed over v_0 from which tanh is 1 to 1e-7, whatever the instants.
@@ -82,24 +87,26 @@ contains
       end associate
       call contact%constants%bind(keys, key('slip_speed', 'sliding velocity du/dt at which '// &
          'tanh(1) = 76 % of the friction acts', above(0.0_wp), 'L/s', 'n_pairs', &
-         absent='required with tangential dofs'), slides)
+         absent='of the file, else required with tangential dofs'), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
       call bind_normal_constants(keys, contact)
       associate (constants => contact%constants)
          call constants%bind(keys, key('mu_dynamic', 'friction coefficient of fast sliding, '// &
-            'to which mu falls', at_least(0.0_wp), '', 'n_pairs', absent='mu'), .false.)
+            'to which mu falls', at_least(0.0_wp), '', 'n_pairs', &
+            absent='of the file, else mu'), .false.)
          call constants%bind(keys, key('weakening_speed', 'over which friction falls from mu '// &
-            'to mu_dynamic', above(0.0_wp), 'L/s', 'n_pairs', absent='required with mu_dynamic'), &
+            'to mu_dynamic', above(0.0_wp), 'L/s', 'n_pairs', &
+            absent='of the file, else required with mu_dynamic'), &
             constants%has('mu_dynamic'))
          call constants%bind(keys, key('weakening_exponent', 'of the speed in exp(-(v/'// &
             'weakening_speed)**e)', at_least(1.0_wp) .and. at_most(2.0_wp), '', 'n_pairs', &
-            absent='1'), .false.)
+            absent='of the file, else 1'), .false.)
          call constants%bind(keys, key('mu_viscous', 'what mu gains with the sliding speed', &
-            at_least(0.0_wp), 's/L', 'n_pairs', absent='0'), .false.)
+            at_least(0.0_wp), 's/L', 'n_pairs', absent='of the file, else 0'), .false.)
          call constants%bind(keys, key('speed_1', 'velocity of side 2 along t1: a belt or a disk', &
-            unit='L/s', shape='n_pairs', absent='0'), .false.)
+            unit='L/s', shape='n_pairs', absent='of the file, else 0'), .false.)
          call constants%bind(keys, key('speed_2', 'the same along t2', unit='L/s', &
-            shape='n_pairs', absent='0'), .false.)
+            shape='n_pairs', absent='of the file, else 0'), .false.)
       end associate
    end subroutine bind_keys
 
@@ -389,11 +396,11 @@ contains
               tanh_over(speed/self%slip_speed(element))
    end function slope_at_rest
 
-   !> The friction coefficient, and slip_speed.
+   !> The friction coefficient, slip_speed and mu_dynamic.
    pure integer function n_parameters(self)
       class(regularised_law), intent(in) :: self
 
-      n_parameters = merge(2, 0, self%n_elements > 0)
+      n_parameters = merge(size(constant_words), 0, self%n_elements > 0)
    end function n_parameters
 
    subroutine by_parameter(self, number, fourier, work, force)
@@ -403,27 +410,72 @@ contains
       type(force_workspace), intent(in) :: work
       real(wp), intent(inout) :: force(:, :, :)
       real(wp) :: values(self%n_elements, 3, fourier%n_time)
-      real(wp) :: p, s, factor, v(2)
       integer :: i, k
 
       values = 0.0_wp
       do k = 1, fourier%n_time
          do i = 1, self%n_elements
-            associate (v_0 => self%slip_speed(i), sliding => self%sliding(i))
-               v = work%prediction_time(i, 1:2, k) - sliding%speed
-               ! mu(s) by mu, and d lambda_t/d v_0 = -mu(s) p/v_0**2 (1 - tanh(s)**2) v.
-               p = -work%force_time(i, 3, k)
-               s = norm2(v)/v_0
-               factor = p/v_0*tanh_over(s)
-               if (sliding%weakens) factor = factor*exp( &
-                                    -(norm2(v)/sliding%weakening_speed)**sliding%exponent)
-               if (number == 2) factor = -friction_at(sliding, self%mu(i), norm2(v))*p/v_0**2* &
-                                         (1.0_wp - tanh(s)**2)
-               values(i, 1:2, k) = factor*v
-            end associate
+            values(i, 1:2, k) = slope_by(self, number, i, work%prediction_time(i, 1:2, k), &
+                                         -work%force_time(i, 3, k))
          end do
       end do
       call fourier%to_coefficients(3*self%n_elements, values, force)
    end subroutine by_parameter
+
+   !> Friction in proportion to mu is known by its inputs.
+   pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
+      class(regularised_law), intent(in) :: self
+      integer, intent(in) :: element
+      character(*), intent(in) :: name
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(inout) :: force(:, :)
+      logical, intent(out) :: is_known
+      real(wp) :: values(2)
+      integer :: c, k, number
+
+      number = findloc(constant_words, name, dim=1)
+      associate (sliding => self%sliding(element))
+         is_known = number > of_mu .or. (number == of_mu .and. (sliding%weakens .or. &
+                                                                sliding%viscous > 0.0_wp))
+      end associate
+      force = 0.0_wp
+      if (.not. is_known) return
+      do k = 1, fourier%n_time
+         values = slope_by(self, number, element, work%prediction_time(element, 1:2, k), &
+                           -work%force_time(element, 3, k))
+         do c = 1, 2
+            force(:, c) = force(:, c) + values(c)*fourier%analysis(:, k)
+         end do
+      end do
+   end subroutine by_constant
+
+   !> Derivative of the friction at an instant, of inputs y under a pressure p:
+   !>
+   !>   by mu    exp(-(s/v_w)**e) p tanh(s/v_0) v/s    by mu_d   the rest to 1 of exp in its place
+   !>   by v_0   -mu(s) p/v_0**2 (1 - tanh(s/v_0)**2) v
+   pure function slope_by(self, number, element, y, p) result(slope)
+      class(regularised_law), intent(in) :: self
+      integer, intent(in) :: number, element
+      real(wp), intent(in) :: y(2), p
+      real(wp) :: slope(2)
+      real(wp) :: v(2), s, share
+
+      associate (v_0 => self%slip_speed(element), sliding => self%sliding(element))
+         v = y - sliding%speed
+         s = norm2(v)
+         share = 1.0_wp
+         if (sliding%weakens) share = exp(-(s/sliding%weakening_speed)**sliding%exponent)
+         select case (number)
+         case (of_slip_speed)
+            slope = -friction_at(sliding, self%mu(element), s)*p/v_0**2*(1.0_wp - &
+                                                                         tanh(s/v_0)**2)*v
+         case (of_mu_dynamic)
+            slope = (1.0_wp - share)*p/v_0*tanh_over(s/v_0)*v
+         case default ! mu
+            slope = share*p/v_0*tanh_over(s/v_0)*v
+         end select
+      end associate
+   end function slope_by
 
 end module fw_regularised

@@ -43,6 +43,7 @@ module fw_several_laws
       procedure :: input_of_slope
       procedure :: input_of_pressure
       procedure :: pressing_constant
+      procedure :: by_constant
       procedure :: instants_wanted
       procedure :: located
    end type several_laws
@@ -428,6 +429,26 @@ contains
 
       call self%member(self%of_member(element))%law%input_of_pressure(self%place(element), y)
    end subroutine input_of_pressure
+
+   pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element
+      character(*), intent(in) :: name
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(inout) :: force(:, :)
+      logical, intent(out) :: is_known
+
+      is_known = .false.
+      force = 0.0_wp
+      select type (room => work%room)
+      type is (members_room)
+         associate (m => self%of_member(element))
+            call self%member(m)%law%by_constant(self%place(element), name, fourier, room%work(m), &
+                                                force, is_known)
+         end associate
+      end select
+   end subroutine by_constant
 
    pure function pressing_constant(self, element) result(name)
       class(several_laws), intent(in) :: self

@@ -162,6 +162,7 @@ contains
       if (range%below < huge(1.0_wp)) text = text//', "below": '//number_text(range%below)
       if (range%least > -huge(1.0_wp)) text = text//', "least": '//number_text(range%least)
       if (range%most < huge(1.0_wp)) text = text//', "most": '//number_text(range%most)
+      if (range%whole) text = text//', "whole": true'
    end function range_json
 
    !> A text of an object; nothing where it is blank.

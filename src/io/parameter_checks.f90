@@ -12,7 +12,7 @@ module fw_parameter_checks
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
-      is_of_matrices, is_per_pair, is_per_spring, normal_coefficient, normal_load, &
+      is_of_matrices, is_per_pair, is_per_spring, mu_dynamic, normal_coefficient, normal_load, &
       normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, parameter_group, &
       parameter_key, parameter_words, parameters, positive, reference_force, rotation_speed, &
       static_scale, tangential_stiffness
@@ -108,9 +108,9 @@ contains
             reason = 'contact%law = '//trim(law_text(contact))//' has no '//trim(key)
          end if
       end if
-      if (number == friction_coefficient .and. (contact%constants%has('mu_dynamic') .or. &
-                                                contact%constants%has('mu_viscous'))) then
-         reason = 'friction that weakens or grows with the speed is not in proportion to mu'
+      if (number == mu_dynamic .and. .not. (allocated(reason) .or. &
+                                            contact%constants%has('mu_dynamic'))) then
+         reason = 'friction does not weaken: contact%mu_dynamic is not given'
       end if
       if (number == friction_coefficient .and. any(pairs_with(contact, table))) then
          reason = "the pressure of normal_law = 'table' has no derivative by mu that is known: "// &

@@ -1,4 +1,5 @@
-!> Motion of the base: group &base on top of a model file, and what it makes of pairs and springs.
+!> Motion of the base: group &base on top of a model file, and what it makes of pairs, springs and
+!> other elements.
 !>
 !> Elements see relative displacements alone, those of u = y + R u_b: R has to be such that y says
 !> them. An element between a support and another dof takes that dof along, R = 1 there, and so on
@@ -6,6 +7,8 @@
 module fw_read_base
    use fw_base_motion, only: base_motion, motion_acceleration, motion_displacement, motion_velocity
    use fw_contact_data, only: contact_type, spring_type
+   use fw_element_group, only: element_group
+   use fw_elements, only: element_list
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_raw_model, only: raw_model
@@ -18,13 +21,14 @@ module fw_read_base
 
 contains
 
-   !> The keys of the group; supports of pairs and springs become the ground of y.
-   subroutine read_base(reader, is_cyclic, raw, contact, springs)
+   !> The keys of the group; supports of elements become the ground of y.
+   subroutine read_base(reader, is_cyclic, raw, contact, springs, elements)
       type(reader_type), intent(inout) :: reader
       logical, intent(in) :: is_cyclic
       type(raw_model), intent(inout) :: raw
       type(contact_type), intent(inout) :: contact
       type(spring_type), intent(inout) :: springs
+      type(element_list), intent(inout) :: elements
 
       associate (base => raw%base)
          if (.not. reader%given('base', 'n_terms') .and. reader%has_group('base')) then
@@ -47,7 +51,7 @@ contains
          if (reader%failed()) return
          allocate (base%carried(raw%order()), source=0.0_wp)
          base%carried(abs(base%dof)) = real(sign(1, base%dof), wp)
-         call carry(reader, base, contact, springs)
+         call carry(reader, base, contact, springs, elements)
       end associate
    end subroutine read_base
 
@@ -107,13 +111,14 @@ contains
 
    !> R of the dofs that elements join to supports, until no more are found; then supports stand for
    !> the ground.
-   subroutine carry(reader, base, contact, springs)
+   subroutine carry(reader, base, contact, springs, elements)
       type(reader_type), intent(inout) :: reader
       type(base_motion), intent(inout) :: base
       type(contact_type), intent(inout) :: contact
       type(spring_type), intent(inout) :: springs
+      type(element_list), intent(inout) :: elements
       logical :: is_carried(0:size(base%carried)), is_support(0:size(base%carried)), grows
-      integer :: c, i
+      integer :: c, i, k
 
       is_support = .false.
       is_support(abs(base%dof)) = .true.
@@ -129,15 +134,30 @@ contains
          do i = 1, springs%n_springs
             call pass_on(springs%side_1(i), springs%side_2(i))
          end do
+         do k = 1, size(elements%slot)
+            associate (group => elements%slot(k)%group)
+               do i = 1, group%n_elements
+                  do c = 1, group%n_in
+                     call pass_on(group%row_side_1(c, i), group%row_side_2(c, i))
+                  end do
+               end do
+            end associate
+         end do
       end do
       do i = 1, contact%n_pairs
          do c = 1, 3
-            call ground('contact', 'pair', i, contact%side_1(c, i), contact%side_2(c, i))
+            call ground('contact', 'side_1', 'and side_2: pair '//to_text(i), &
+                        contact%side_1(c, i), contact%side_2(c, i))
             if (reader%failed()) return
          end do
       end do
       do i = 1, springs%n_springs
-         call ground('spring', 'spring', i, springs%side_1(i), springs%side_2(i))
+         call ground('spring', 'side_1', 'and side_2: spring '//to_text(i), springs%side_1(i), &
+                     springs%side_2(i))
+         if (reader%failed()) return
+      end do
+      do k = 1, size(elements%slot)
+         call ground_group(elements%slot(k)%group)
          if (reader%failed()) return
       end do
 
@@ -165,19 +185,31 @@ contains
          if (side /= 0) motion_of = sign(1, side)*base%carried(abs(side))
       end function motion_of
 
-      subroutine ground(group, name, number, side_1, side_2)
-         character(*), intent(in) :: group, name
-         integer, intent(in) :: number
+      !> Elements as the law counts them: terms that share dofs are one.
+      subroutine ground_group(group)
+         class(element_group), intent(inout) :: group
+
+         do i = 1, group%n_elements
+            do c = 1, group%n_in
+               call ground(trim(group%name()), trim(group%count_key()), '= '// &
+                           to_text(group%n_given)//': element '//to_text(i), &
+                           group%row_side_1(c, i), group%row_side_2(c, i))
+               if (reader%failed()) return
+            end do
+         end do
+      end subroutine ground_group
+
+      subroutine ground(group, key, name, side_1, side_2)
+         character(*), intent(in) :: group, key, name
          integer, intent(inout) :: side_1, side_2
 
          if (side_1 == 0 .and. side_2 == 0) return
          if (is_support(abs(side_1)) .and. is_support(abs(side_2))) then
-            call reader%refuse(group, 'side_1', 'and side_2: both sides of '//name//' '// &
-                               to_text(number)//' are supports of &base dof: remove it')
+            call reader%refuse(group, key, name//' joins two supports of &base dof: remove it')
          else if (abs(motion_of(side_1) - motion_of(side_2)) > 0.0_wp) then
-            call reader%refuse(group, 'side_1', 'and side_2: '//name//' '//to_text(number)// &
-                               ' sees the motion of &base dof itself, not relative ones alone: '// &
-                               'elements must join what supports move to supports only')
+            call reader%refuse(group, key, name//' sees the motion of &base dof itself, not '// &
+                               'relative ones alone: elements must join what supports move to '// &
+                               'supports only')
          end if
          if (is_support(abs(side_1))) side_1 = 0
          if (is_support(abs(side_2))) side_2 = 0

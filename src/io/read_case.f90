@@ -438,7 +438,11 @@ contains
       case%damps_modes_up_to = options%modal_damping_up_to
       call read_loads(reader, options, raw, terms)
       call case%stress%take(raw%stress, options%rotation_speed)
-      call read_motion(reader, case%model%cyclic%is_cyclic, raw, case%contact, case%springs)
+      call read_motion(reader, case%model%cyclic%is_cyclic, raw, case%contact, case%springs, &
+                       case%elements)
+      if (raw%base%moves_supports() .and. .not. reader%failed()) then
+         call case%stress%ride(raw%base%dof, raw%base%carried)
+      end if
       wanted = case%sensitivity%parameters
       if (case%varied > 0) then
          if (all(wanted /= case%varied)) wanted = [wanted, case%varied]

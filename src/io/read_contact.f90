@@ -264,12 +264,10 @@ contains
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(in) :: contact
       logical, dimension(contact%n_pairs) :: are, normal
-      real(wp) :: exponent(contact%n_pairs)
       integer :: i
 
       are = pairs_are_hysteretic(contact)
       normal = has_normal(contact)
-      exponent = contact%constants%get('bouc_wen_exponent', contact%n_pairs, 1.0_wp)
       do i = 1, contact%n_pairs
          if (.not. are(i)) cycle
          associate (a => contact%side_1(:, i), b => contact%side_2(:, i))
@@ -287,10 +285,6 @@ contains
                                to_text(i)//": must be above 0 with law = 'iwan' or 'bouc_wen'")
             return
          end if
-         if (any(abs(exponent(i) - [1.0_wp, 2.0_wp]) <= 0.0_wp)) cycle
-         call reader%refuse('contact', 'bouc_wen_exponent', '= '//to_text(exponent(i))// &
-                            ' for pair '//to_text(i)//': must be 1 or 2')
-         return
       end do
    end subroutine check_hysteresis
 

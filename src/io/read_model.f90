@@ -380,9 +380,10 @@ contains
          reason = 'is given, but nothing of the model depends on the rotation speed '// &
                   '(stiffness_rotation, coriolis, circulatory, load static_rotation, contact '// &
                   'gap_rotation, normal_load_rotation): remove it'
-      else if (options%modal_damping > 0.0_wp .and. allocated(raw%stiffness_rotation)) then
+      else if (options%modal_damping > 0.0_wp .and. (model%cyclic%has_sectors() &
+               .or. allocated(raw%stiffness_rotation))) then
          reason = 'does not go with model%modal_damping, whose modes would change with '// &
-                  'stiffness_rotation: give damping, or rayleigh_stiffness'
+                  'the speed: give damping, or rayleigh_stiffness'
       end if
       if (allocated(reason)) call reader%refuse('sweep', 'speed_order', reason)
    end subroutine check_speed_order

@@ -36,7 +36,7 @@ contains
                                 "'contact%mu', 'load%harmonic_scale', ...", &
                                 absent='none: no derivatives', &
                                 only="analysis = 'frf', 'point', 'resonance', 'mode'"), &
-                            'names of parameters, such as contact%mu', size(parameter_words), &
+                            'some of '//list_of(parameter_words), size(parameter_words), &
                             words, is_text)
       call find_words(reader, 'parameters', words, parameter_words, options%parameters)
       call reader%bind_list(key('quantities', 'what is differentiated: first_harmonic, '// &

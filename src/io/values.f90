@@ -23,15 +23,17 @@ module fw_values
 contains
 
    !> What a range accepts, in words: `a finite real above 0`.
-   function range_text(kind, range) result(text)
+   function range_text(of, range) result(text)
       !> `a finite real`, `an integer` or the like.
-      character(*), intent(in) :: kind
+      character(*), intent(in) :: of
       type(range_type), intent(in) :: range
-      character(:), allocatable :: text
+      character(:), allocatable :: text, kind
       logical :: has_least, has_most
 
       has_least = range%least > -huge(1.0_wp)
       has_most = range%most < huge(1.0_wp)
+      kind = of
+      if (range%whole) kind = 'a whole number'
       text = kind
       ! In the order in which one says it: above or at least, then below or at most.
       if (range%above > -huge(1.0_wp)) text = text//' above '//number_text(range%above)

@@ -172,9 +172,10 @@ contains
                          absent='of the file'), n_table)
       call keys%set_size('n_table', n_table)
       needed = n_table > 0
-      call keys%bind(key('table_frequency', 'where the table has points, rising; linear '// &
-                         'between them, refused beyond', at_least(0.0_wp), unit='rad/s', &
-                         shape='n_table', absent='of the file, else required with n_table'), &
+      call keys%bind(key('table_frequency', 'where the table has points, whatever '// &
+                         'sweep%unit, rising; linear between them, refused beyond', &
+                         at_least(0.0_wp), unit='rad/s', shape='n_table', &
+                         absent='of the file, else required with n_table'), &
                      frequency, needed .and. .not. allocated(frequency))
       call keys%bind(key('table_scale', 'factor of the loads there', shape='n_table', &
                          absent='of the file, else required with n_table'), scale, &

@@ -12,14 +12,15 @@ module fw_parameters
    public :: harmonic_scale, static_scale, friction_coefficient, normal_load, gap, &
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
              rotation_speed, rayleigh_mass, rayleigh_stiffness, normal_coefficient, &
-             reference_force, loss_factor
+             reference_force, loss_factor, slip_speed, mu_dynamic
    public :: of_sliding, of_closing, of_pressed, not_negative, positive
 
    integer, parameter :: harmonic_scale = 1, static_scale = 2, friction_coefficient = 3, &
                          normal_load = 4, gap = 5, tangential_stiffness = 6, &
                          normal_stiffness = 7, spring_coefficient = 8, modal_damping = 9, &
                          rotation_speed = 10, rayleigh_mass = 11, rayleigh_stiffness = 12, &
-                         normal_coefficient = 13, reference_force = 14, loss_factor = 17
+                         normal_coefficient = 13, reference_force = 14, loss_factor = 17, &
+                         slip_speed = 18, mu_dynamic = 19
 
    !> Where its values are: one of the loads, one for each pair or spring, one of the matrices, one
    !> for each of a group of other elements (its coefficient).
@@ -62,7 +63,9 @@ module fw_parameters
       parameter_type('contact%reference_force', of_pairs, positive, of_closing), &
       parameter_type('polynomial%coefficient', of_elements), &
       parameter_type('damper%coefficient', of_elements), &
-      parameter_type('model%loss_factor', of_matrices, not_negative)]
+      parameter_type('model%loss_factor', of_matrices, not_negative), &
+      parameter_type('contact%slip_speed', of_pairs, positive, of_sliding), &
+      parameter_type('contact%mu_dynamic', of_pairs, not_negative, of_sliding)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word

@@ -27,6 +27,8 @@ module fw_continuation
       !> First step as a share of the interval.
       real(wp) :: step = 0.01_wp
       integer :: max_points = 1000
+      !> Values of p where the equations turn a corner: a point lies on each.
+      real(wp), allocatable :: corner(:)
       !> Why the branch ended.
       character(:), allocatable :: ending
       logical :: ended = .false.
@@ -197,18 +199,22 @@ contains
       if (done) call self%trail%forget()
    end subroutine pass_over
 
-   !> A step has come to `ahead`: it is the next point, unless a fold or a bound lies before it.
+   !> A step has come to `passed`: it is the next point, unless a corner of the equations, a fold or
+   !> a bound lies before it.
    !> A fold between the two is given out first and `ahead` waits: `next` gives it out afterwards.
-   subroutine settle(self, system, ahead, point, error)
+   subroutine settle(self, system, passed, point, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
-      type(branch_point), intent(in) :: ahead
+      type(branch_point), intent(in) :: passed
       type(branch_point), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: before
+      type(branch_point) :: before, ahead
       real(wp) :: bound
+      logical :: on_corner
 
       before = self%here
+      call stop_at_corner(self, system, passed, ahead, on_corner, error)
+      if (allocated(error)) return
       ! Outside of both bounds: the one on whose side it lies.
       if ((ahead%p - self%start)*(ahead%p - self%finish) > 0.0_wp) then
          bound = merge(self%start, self%finish, (ahead%p - self%start)*(self%finish - &
@@ -222,6 +228,8 @@ contains
          call end_at_bound(self, ahead, self%finish)
       else
          call self%plan(system, ahead)
+         ! No cubic goes round a corner.
+         if (on_corner) self%history%known = .false.
          call self%way%add(self%here)
          self%waiting = ahead
       end if
@@ -235,6 +243,75 @@ contains
       point = self%waiting
       call pass(self, point)
    end subroutine settle
+
+   !> The first corner between the last point and one that was reached, if there is any.
+   subroutine stop_at_corner(self, system, passed, ahead, found, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: passed
+      type(branch_point), intent(out) :: ahead
+      !> Whether `ahead` lies on a corner.
+      logical, intent(out) :: found
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: landed
+      real(wp) :: corner, r(system%n)
+      integer :: k
+
+      ahead = passed
+      found = .false.
+      if (.not. allocated(self%corner)) return
+      corner = passed%p
+      associate (here => self%here%p, least => round_off*abs(self%finish - self%start))
+         do k = 1, size(self%corner)
+            if ((self%corner(k) - here)*(self%corner(k) - corner) >= 0.0_wp) cycle
+            if (min(abs(self%corner(k) - here), abs(self%corner(k) - corner)) <= least) cycle
+            corner = self%corner(k)
+            found = .true.
+         end do
+      end associate
+      if (.not. found) return
+      call land(self%corrector, system, self%here, passed, corner, landed, error)
+      if (allocated(error)) return
+      if (landed%report%converged) then
+         call turn_round_corner(self, system, passed, landed, error)
+         if (allocated(error)) return
+         call self%forget_ahead()
+         ahead = landed
+      end if
+      ! What follows takes the system and its factors at the point.
+      call system%set_parameter(ahead%p, error)
+      if (allocated(error)) return
+      call system%residual(ahead%x, r)
+      call self%corrector%linear%prepare(system, found)
+      found = landed%report%converged
+   end subroutine stop_at_corner
+
+   !> The tangent of the far side of a corner, along the way that p goes.
+   subroutine turn_round_corner(self, system, passed, point, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: passed
+      type(branch_point), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+      !> Beyond the differences that slopes are found by, over p.
+      real(wp), parameter :: beside = 1.0e-6_wp
+      real(wp) :: corner
+      logical :: done
+
+      corner = point%p
+      point%p = corner + sign(beside*abs(corner), passed%p - self%here%p)
+      call system%set_parameter(point%p, error)
+      if (.not. allocated(error)) then
+         call self%corrector%find_tangent(system, passed, point, done)
+      end if
+      point%p = corner
+      ! A sharp corner may turn it round in the measure of the curve.
+      if (point%t_p*(passed%p - self%here%p) >= 0.0_wp) return
+      point%t = -point%t
+      point%t_y = -point%t_y
+      point%t_p = -point%t_p
+      point%orientation = -point%orientation
+   end subroutine turn_round_corner
 
    !> Count a point and see whether the branch runs away.
    subroutine pass(self, point)

@@ -144,6 +144,34 @@ def test_many_pairs_as_blocks_one_by_one(tmp_path):
                                atol=1e-7 * single.max())
 
 
+#: Two masses that press along curves and rub, with a damper between them.
+CURVED = {
+    "case": {"analysis": "wear", "threads": 1},
+    "model": {"n_dof": 3, "mass": np.diag([1.0, 0.8, 1.2]), "damping": 0.05 * np.eye(3),
+              "stiffness": np.array([[2.6, -1.0, 0.0], [-1.0, 2.6, -1.1], [0.0, -1.1, 2.6]])},
+    "contact": {"n_pairs": 1, "law": "penalty", "side_1": [2, 0, 1], "mu": 0.3, "gap": -0.3,
+                "area": 1.0, "tangential_stiffness": 0.8, "normal_law": "power",
+                "normal_coefficient": 3.0},
+    "damper": {"n_dampers": 1, "side_1": 2, "side_2": 3, "coefficient": 0.1, "power": 2.0},
+    "load": {"cosine": [0.4, 0.5, 0.6], "static": [-0.5, 0.0, 0.0]},
+    "harmonics": {"n_harmonics": 3, "n_time": 512}, "sweep": {"start": 0.9},
+    "solver": {"tolerance": 1e-11}, "wear": {"coefficient": 1e-4, "error_tolerance": 1e-9}}
+
+
+def test_blocks_change_laws_dampers_and_matrices(tmp_path):
+    blocks = [(200.0, "damper%coefficient = 0.3; damper%power = 1.5"),
+              (100.0, "contact%normal_coefficient = 2.0; contact%normal_exponent = 1.2"),
+              (100.0, "model%loss_factor = 0.05; contact%mu = 0.2")]
+    found = result(tmp_path, mission(CURVED, blocks, 2))["mission/depth"]
+    single = one_by_one(tmp_path, CURVED, blocks, 2)
+    np.testing.assert_allclose(found[1:], single, rtol=0, atol=1e-7 * single.max())
+    # And each of them matters.
+    for k in range(len(blocks)):
+        other = [(cycles, "" if k == j else change) for j, (cycles, change) in enumerate(blocks)]
+        depth = result(tmp_path, mission(CURVED, other, 2))["mission/depth"]
+        assert np.abs(depth[-1] - found[-1]).max() > 1e-4 * single.max()
+
+
 def slow(per_jump, tolerance=STEP, n_flights=64):
     return sliding("speed", n_flights=n_flights, per_jump=per_jump, slower=0.02,
                    tolerance=tolerance)

@@ -141,13 +141,23 @@ def rigid(n_harmonics=5):
 
 def test_a_ground_that_moves_is_supports_that_move_alike(tmp_path):
     """Without a support the row stands on the ground."""
+    check_on_ground(tmp_path, {})
+    # Dampers of broken powers between the masses, and to what moves.
+    check_on_ground(tmp_path, {"n_dampers": 2, "coefficient": [0.3, 0.2], "power": [2.0, 1.5]})
+
+
+def check_on_ground(tmp_path, damper):
+    on_support = {**rigid(), **({"damper": {**damper, "side_1": [1, 2], "side_2": [2, 3]}}
+                                if damper else {})}
     on_ground = merged(rigid(), {"base": {"dof": None, "direction": [1.0, 1.0, 0.0]}})
+    if damper:
+        on_ground["damper"] = {**damper, "side_1": [1, 2], "side_2": [2, 0]}
     on_ground["model"]["stiffness"] = np.array([[1.2, -1.2, 0.0], [-1.2, 2.7, 0.0],
                                                 [0.0, 0.0, 1.0]])
     on_ground["model"]["damping"] = 0.05 * np.array([[1.2, -1.2, 0.0], [-1.2, 2.7, 0.0],
                                                      [0.0, 0.0, 0.0]])
     ground = run_case(tmp_path, on_ground)
-    absolute = run_case(tmp_path, merged(rigid(), {"base": {"frame": "absolute"}}))
+    absolute = run_case(tmp_path, merged(on_support, {"base": {"frame": "absolute"}}))
     base = np.zeros(11)
     base[1] = 0.4
     moved = absolute.coefficients[0][:, :2] - base[:, None]
@@ -237,7 +247,66 @@ def test_a_model_file_says_what_moves(tmp_path):
     assert np.array_equal(in_memory.coefficients, by_keys.coefficients)
 
 
+def test_dampers_see_the_motion_beside_the_base(tmp_path):
+    """One of power 1 between a support and what the pair joins to it is viscous damping there."""
+    viscous = frame()
+    damping = np.array(viscous["model"]["damping"])
+    damping[np.ix_([0, 2], [0, 2])] += 0.3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    viscous["model"]["damping"] = damping
+    one = run_case(tmp_path, viscous)
+    damper = {"n_dampers": 1, "side_1": 1, "side_2": 3, "coefficient": 0.3}
+    two = run_case(tmp_path, {**frame(), "damper": damper})
+    assert difference(two.coefficients, one.coefficients) < WITHIN
+
+
+@pytest.mark.parametrize("frame_of", ["relative", "absolute"])
+def test_stress_is_that_of_the_whole_motion(tmp_path, frame_of):
+    """S u of all dofs, the supports among them, whatever frame is observed."""
+    random = np.random.default_rng(5)
+    rows = random.normal(size=(2, 6, 4))
+    case = frame(harmonic=[1, 0], frame=frame_of)
+    case["load"] = {"static": [0.1, 0.2, 0.0, 0.0]}
+    observed = run_case(tmp_path, merged(case, {"base": {"frame": "absolute"}}))
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        file.attrs.update(format="fretwear-model", format_version=1)
+        for name in ("mass", "stiffness", "damping"):
+            file[name] = case["model"][name]
+        file["load/static"] = case["load"]["static"]
+        file["stress/matrix"] = rows
+    filed = {**case, "model": {"source": "hdf5", "file": "m.h5"}, "load": {},
+             "stress": {"output": "tensor"}}
+    run(tmp_path, filed)
+    with h5py.File(tmp_path / "case.h5") as file:
+        found = file["stress/coefficients"][0]
+        amplitude = file["stress/amplitude"][0]
+    u = observed.coefficients[0]
+    wanted = np.einsum("pcn,hn->hpc", rows, u)
+    assert np.abs(found - wanted).max() < WITHIN * np.abs(wanted).max()
+    assert (amplitude > 0.01).all()
+
+
+def test_a_given_amplitude_on_a_base(tmp_path):
+    """The motion of the base that it takes, and a run with that motion."""
+    case = merged(frame(), {"control": {"amplitude": 0.4, "of": "largest"},
+                            "output": {"observe": 2}})
+    run(tmp_path, case)
+    with h5py.File(tmp_path / "case.h5") as file:
+        scale, base = file["load/scale"][0], file["base/coefficients"][0]
+    assert np.ravel(scale)[0] > 0.0
+    free = {key: keys for key, keys in case.items() if key != "control"}
+    one = run_case(tmp_path, merged(free, {"load": {"harmonic_scale": float(np.ravel(scale)[0])}}))
+    assert abs(one.amplitude[0, 0] - 0.4) < 1e-7
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert np.allclose(file["base/coefficients"][0], base, rtol=1e-12, atol=1e-14)
+
+
 REFUSED = [
+    ({"polynomial": {"n_terms": 1, "factors": [1, 1, 1, 1, 0, 0, 0, 0], "coefficient": 0.1}},
+     "sees the motion of &base dof itself"),
+    ({"damper": {"n_dampers": 1, "side_1": 3, "side_2": -4, "coefficient": 0.1}},
+     "joins two supports of &base dof"),
+    ({"damper": {"n_dampers": 1, "side_1": 3, "side_2": 0, "coefficient": 0.1}},
+     "sees the motion of &base dof itself"),
     ({"base": {"dof": None}}, "dof is missing"),
     ({"base": {"direction": [1.0, 0.0, 0.0, 0.0]}}, "must be one of both"),
     ({"base": {"n_terms": None}}, "n_terms is missing"),
@@ -250,7 +319,7 @@ REFUSED = [
     ({"base": {"dof": None, "direction": [1.0] * 4, "frame": "absolute"}}, "goes with dof"),
     ({"base": {"harmonic": [1, 9]}}, "acts in harmonic 9"),
     ({"load": {"cosine": [0.0, 0.0, 1.0, 0.0]}}, "has a load"),
-    ({"contact": {"side_1": [3, 0, 0], "side_2": [4, 0, 0]}}, "both sides of pair 1"),
+    ({"contact": {"side_1": [3, 0, 0], "side_2": [4, 0, 0]}}, "pair 1 joins two supports"),
     ({"contact": {"side_2": 0}, "base": {"dof": [1, 3]}}, "sees the motion of &base dof itself"),
     ({"spring": {"n_springs": 1, "side_1": 1, "coefficient": 0.3}}, "sees the motion of &base"),
     ({"harmonics": {"parity": "odd"}}, "parity"),
@@ -294,6 +363,26 @@ def test_a_table_scales_the_load(tmp_path, continuation):
     one = run_case(tmp_path, case)
     wanted = [0.702439024390244, 0.07804878048780493]
     assert np.abs(one.coefficients[0, 1:, 0] - wanted).max() < 1e-12
+
+
+@pytest.mark.parametrize("ends", [(0.5, 1.5), (1.5, 0.5)])
+@pytest.mark.parametrize(("control", "spring"), [(False, True), (True, True), (True, False)])
+def test_a_branch_has_a_row_at_every_point_of_a_table(tmp_path, ends, control, spring):
+    """A corner of the response lies between no two rows, whichever way the curve goes."""
+    points = (0.5, 0.71, 0.93, 1.0, 1.5)
+    case = table(points, (1.0, 0.4, 1.1, 0.6, 2.0), start=ends[0], end=ends[1],
+                 continuation="arclength", n_points=4)
+    # What is linear is no curve to be followed, unless its amplitude is given.
+    if spring:
+        case["spring"] = {"n_springs": 1, "side_1": 1, "coefficient": 5e-4, "power": 3}
+    if control:
+        case["control"] = {"amplitude": 0.5}
+    found = run_case(tmp_path, case)
+    assert found.converged.all()
+    for point in points:
+        assert np.abs(found.omega - point).min() < 1e-12
+    # Once each, in the order of the sweep.
+    assert (np.diff(found.omega) * (ends[1] - ends[0]) > 0.0).all()
 
 
 def test_a_table_is_one_for_all_loads(tmp_path):

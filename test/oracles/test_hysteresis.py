@@ -130,6 +130,33 @@ def test_parallel_pairs_come_to_iwan(tmp_path):
     assert errors[1] < errors[0] / 2.5 and errors[2] < errors[1] / 2.5
 
 
+@pytest.mark.parametrize("chi", [-0.9, -0.99, -0.999])
+@pytest.mark.parametrize("beta", [0.0, 0.3])
+def test_chi_near_its_end(tmp_path, chi, beta):
+    """Work and force of the loop between the ends of the motion, in closed form (Segalman 2005)."""
+    k, limit = 2.0, 0.6
+    p = {"m": 1.0, "c": 0.05, "k": 1.0, "F": 0.8, "omega": 1.1, "F_S": limit, "K_T": k,
+         "chi": chi, "beta": beta}
+    found = run_case(tmp_path, oscillator(p, iwan(p), 7))
+    tau = 2.0 * np.pi * np.arange(20001) / 20000
+    u = sum(found.coefficients[0, 2 * n - 1, 0] * np.cos(n * tau)
+            + found.coefficients[0, 2 * n, 0] * np.sin(n * tau) for n in range(1, 8))
+    # One swing there and one back: D of the amplitude alone.
+    assert np.count_nonzero(np.diff(np.sign(np.diff(u)))) == 2
+    a = u.max()
+    share = beta + (chi + 1.0) / (chi + 2.0)
+    most = limit * (1.0 + beta) / (k * share)
+    r = limit * (chi + 1.0) / (most**(chi + 2.0) * share)
+    if a < most:
+        work = 4.0 * r * a**(chi + 3.0) / ((chi + 2.0) * (chi + 3.0))
+    else:
+        work = 4.0 * (limit * a - r * most**(chi + 3.0) / (chi + 3.0)
+                      - limit / most * beta / share * most**2)
+    # The largest displacement of a grid, and 20,000 instants of one swing: of second order.
+    assert found.dissipation[0, 0] == pytest.approx(work, rel=1e-6)
+    assert work > 1e-3
+
+
 @pytest.mark.parametrize("beta", [0.0, 0.7])
 def test_sliders_have_the_stiffness_and_the_limit_of_the_joint(beta):
     for chi in (-0.9, -0.5, 0.4):
@@ -278,7 +305,7 @@ REFUSED = [
     ({"contact": {"iwan_beta": -0.1}}, "iwan_beta"),
     ({"contact": {"tangential_stiffness": [0.0, 1.0]}}, "must be above 0"),
     ({"contact": {"law": "bouc_wen", "iwan_chi": None, "bouc_wen_exponent": 1.5}},
-     "must be 1 or 2"),
+     "must be a whole number from 1 to 2"),
     ({"contact": {"law": "bouc_wen", "iwan_chi": None, "bouc_wen_beta": 0.4}}, "bouc_wen_beta"),
     ({"contact": {"law": "bouc_wen"}}, "belongs to law = 'iwan'"),
     ({"contact": {"memory": "carried"}, "case": {"analysis": "frf"},

@@ -105,6 +105,14 @@ def test_straight_curves_are_springs(tmp_path, law):
         assert difference(other.fraction, spring.fraction) < 1e-12
 
 
+def test_a_table_of_two_points_is_a_spring(tmp_path):
+    spring = run_case(tmp_path, chain(normal_stiffness=2.0))
+    line = run_case(tmp_path, chain(normal_law="table", n_table=2, overclosure=[0.0, 0.3],
+                                    force=[0.0, 0.6]))
+    assert difference(line.coefficients, spring.coefficients) < WITHIN
+    assert difference(line.force, spring.force) < WITHIN
+
+
 def test_a_table_is_springs_side_by_side(tmp_path):
     p = REFERENCE["cases"]["table"]["params"]
     one = groups(p, 5)
@@ -242,6 +250,28 @@ def test_wear_is_that_of_a_spring(tmp_path):
     np.testing.assert_allclose(straight[-1], spring[-1], rtol=1e-6)
     assert spring[-1, 0] > 1e-3
     assert worn(normal_law="power", normal_coefficient=[2.0, 3.0])[-1, 0] > 1e-3
+
+
+def test_wear_of_an_exponential_pressure_by_another_gap(tmp_path):
+    """p0 exp(d/h) has no place of its own: p0 exp(g/h) with the gap g is p0 without one."""
+    def worn(shift, tolerance):
+        case = chain(area=1.0, normal_law="exponential", decay_length=0.25, n_time=1024,
+                     reference_force=[0.2 * np.exp(shift / 0.25), 0.15 * np.exp(shift / 0.25)])
+        case["contact"]["gap"] = [-0.3 + shift, 0.05 + shift]
+        case["contact"]["mu"] = [0.3, 0.2]
+        case["contact"]["side_1"] = [2, 0, 1, 1, 0, 3]
+        case["contact"]["tangential_stiffness"] = [0.8, 0.6]
+        case["case"]["analysis"] = "wear"
+        case["wear"] = {"coefficient": 1e-4, "n_cycles": 300.0, "error_tolerance": tolerance}
+        run(tmp_path, case)
+        return read(tmp_path / "case.h5")
+
+    here, there = worn(0.0, 1e-6), worn(0.17, 1e-6)
+    np.testing.assert_allclose(there["wear/depth"][-1], here["wear/depth"][-1], rtol=1e-7)
+    assert here["wear/depth"][-1, 0] > 1e-3
+    # What is worn away does not press: the mean pressure falls.
+    pressure = -here["contact/force"][:, 0, 0, 2]
+    assert pressure[-1] < pressure[0]
 
 
 def test_a_nonlinear_mode_of_straight_curves_is_that_of_springs(tmp_path):

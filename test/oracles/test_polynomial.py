@@ -14,6 +14,8 @@ from cases import run
 from oracle_runs import run_case
 from project import ROOT
 
+import fretwear as fw
+
 EXACT = json.loads((ROOT / "test/reference/laws/law_polynomial.json").read_text())["cases"]
 #: Residuals of 1e-11 of the load times the condition of the structures, below 100, and a margin of
 #: ten: what two runs of one problem may differ by.
@@ -164,6 +166,43 @@ def test_derivatives_are_those_of_differences(tmp_path):
         # step**2 of the third derivative, and round-off of 1e-11/step.
         assert np.abs(np.ravel(found)[i::len(polynomial["coefficient"])] - wanted).max() < 1e-6 or \
             np.abs(found[..., i] - wanted).max() < 1e-6
+
+
+def test_full_tensors_hold_the_balance(tmp_path):
+    """Tensors without any symmetry on signed dofs: the balance of the result with their forces,
+    written anew at 64 instants, which are exact for degree 3 of 5 harmonics."""
+    random = np.random.default_rng(11)
+    dofs = [1, -3]
+    quadratic, cubic = 0.05 * random.normal(size=(2,) * 3), 0.1 * random.normal(size=(2,) * 4)
+    k = np.array([[2.6, -1.0, 0.2], [-1.0, 2.6, -1.1], [0.2, -1.1, 2.6]])
+    mass, damping, omega, h = np.diag([1.0, 0.8, 1.2]), 0.05 * k, 0.9, 5
+    load = np.array([0.4, 0.1, 0.3])
+    model = fw.Model(mass, damping, k, cosine=load,
+                     elements=[fw.Polynomial.from_tensors(dofs, quadratic, cubic)])
+    model.to_hdf5(tmp_path / "model.h5")
+    found = run_case(tmp_path, {
+        "case": {"analysis": "point"}, "model": {"source": "hdf5", "file": "model.h5"},
+        "harmonics": {"n_harmonics": h}, "sweep": {"start": omega},
+        "solver": {"tolerance": TOLERANCE}})
+    u = found.coefficients[0]
+    tau = 2.0 * np.pi * np.arange(64) / 64
+    waves = np.array([np.ones(64), *(f(n * tau) for n in range(1, h + 1) for f in (np.cos, np.sin))])
+    x = (waves.T @ u)[:, [0, 2]] * [1.0, -1.0]
+    acts = (np.einsum("ijk,tj,tk->ti", quadratic, x, x)
+            + np.einsum("ijkl,tj,tk,tl->ti", cubic, x, x, x)) * [1.0, -1.0]
+    force = np.zeros((64, 3))
+    force[:, [0, 2]] = acts
+    inner = waves @ force / 32.0
+    inner[0] /= 2.0
+    for n in range(h + 1):
+        c = [0] if n == 0 else [2 * n - 1, 2 * n]
+        turn = np.array([1.0]) if n == 0 else np.array([1.0, -1.0j])
+        z = k - (n * omega)**2 * mass + 1j * n * omega * damping
+        rest = z @ (turn @ u[c]) + turn @ inner[c] - (load if n == 1 else 0.0)
+        assert np.abs(rest).max() < 1e-9
+    assert np.abs(acts).max() > 0.01
+    with pytest.raises(fw.InputError, match="polynomial.cubic"):
+        fw.Polynomial.from_tensors(dofs, cubic=np.zeros((3,) * 4))
 
 
 @pytest.mark.parametrize(("change", "message"), [

@@ -137,6 +137,32 @@ def test_random_cycles_with_their_sign(tmp_path, n_harmonics):
     assert found["utilisation"] == pytest.approx(share, rel=1e-12)
 
 
+def test_stress_of_a_speed_that_follows(tmp_path):
+    """Each row as a point of its own speed, with what grows with its square."""
+    datasets, case = structure(7, 3, 2)
+    random = np.random.default_rng(8)
+    datasets |= {"stress/static_rotation": random.normal(size=(3, 6)),
+                 "stiffness_rotation": 0.1 * np.eye(6),
+                 "load/static_rotation": random.normal(size=6)}
+    write_model(tmp_path / "model.h5", datasets)
+    omega = [0.5, 0.9, 1.4]
+    groups = with_model(case)
+    groups["case"] = {"analysis": "frf"}
+    groups["sweep"] = {"values": omega, "speed_order": 2.0}
+    run(tmp_path, groups)
+    names = [f"stress/{name}" for name in ("amplitude", "mean", "utilisation", "coefficients")]
+    with h5py.File(tmp_path / "case.h5") as file:
+        followed = {name: file[name][()] for name in names}
+    for i, w in enumerate(omega):
+        groups["case"], groups["sweep"] = {"analysis": "point"}, {"start": w}
+        groups["model"]["rotation_speed"] = w / 2.0
+        run(tmp_path, groups)
+        with h5py.File(tmp_path / "case.h5") as file:
+            for name in names:
+                one = file[name][0]
+                assert np.abs(followed[name][i] - one).max() < 1e-9 * np.abs(one).max(), name
+
+
 def test_nothing_else_changes(tmp_path):
     """Rows of stress leave the response as it is, along a branch and to an accuracy too."""
     case = REFERENCE["runs"][0]["case"]
