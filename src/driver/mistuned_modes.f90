@@ -50,9 +50,9 @@ contains
          allocate (modes%open_content(n/2 + 1, n_modes), modes%closed_content(n/2 + 1, n_modes))
       end associate
       if (case%model%cyclic%splits_waves()) then
-         call fatal_error(error, '&cyclic mistuned = .true.: natural frequencies of all sectors '// &
-                          'are those without Coriolis forces and forces of the air: leave '// &
-                          'rotation_speed and /aero out, or mistuned', status_input)
+         call fatal_error(error, '&cyclic mistuned = .true.: natural frequencies of all '// &
+                          'sectors are those without Coriolis forces and forces of the air: '// &
+                          'leave rotation_speed and /aero out, or mistuned', status_input)
          return
       end if
       allocate (rows%side_1(0), rows%side_2(0), rows%sector_2(0), rows%is_held(0))

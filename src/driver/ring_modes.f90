@@ -120,8 +120,8 @@ contains
          if (done) exit
       end do
       if (.not. done) then
-         call fatal_error(error, 'the sectors have a part without both stiffness and mass (or a '// &
-                          'mass that is not positive); check the mass and stiffness matrices', &
+         call fatal_error(error, 'the sectors have a part without both stiffness and mass (or '// &
+                          'a mass that is not positive); check the mass and stiffness matrices', &
                           status_input)
          return
       end if

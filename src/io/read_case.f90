@@ -15,9 +15,8 @@ module fw_read_case
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
-   use fw_read_mistuning, only: read_mistuning
    use fw_read_elements, only: read_contact, read_elements, read_springs
-   use fw_read_cyclic, only: check_sectors, read_cyclic
+   use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
    use fw_read_options, only: read_harmonics, read_mission, read_mode, read_stress, read_sweep

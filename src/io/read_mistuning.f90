@@ -1,4 +1,5 @@
-!> Group &mistuning on top of what a model says of sectors that differ, and the matrices that follow.
+!> Group &mistuning on top of what a model says of sectors that differ, and the matrices that
+!> follow.
 !>
 !> With W the rows of blade modes, w their frequencies, d and z the deviations of frequency and
 !> damping, e and m those of stiffness and mass of the blade, s the scale:
@@ -58,8 +59,8 @@ contains
       call keys%bind(key('row_omega', 'their frequencies, blade alone', above(0.0_wp), &
                          unit='rad/s', shape='n_rows', repeats=.false., absent=of_file), &
                      self%row_omega)
-      call keys%bind(key('frequency', 'by which part the frequencies of each blade are above the '// &
-                         'tuned ones: n_sectors values, or all rows of each sector', &
+      call keys%bind(key('frequency', 'by which part the frequencies of each blade are above '// &
+                         'the tuned ones: n_sectors values, or all rows of each sector', &
                          shape=each, repeats=.false., absent=of_file, only=where_used), &
                      self%frequency)
       call keys%bind(key('damping_ratio', 'damping ratios of each blade above the tuned ones, '// &
@@ -87,8 +88,8 @@ contains
       call options%bind_keys(reader)
       if (reader%failed()) return
       if (.not. cyclic%is_cyclic .and. reader%has_group('mistuning')) then
-         call reader%refuse('mistuning', 'scale', 'and the other keys of the group need sectors: '// &
-                            'give &cyclic n_sectors, or leave the group out')
+         call reader%refuse('mistuning', 'scale', 'and the other keys of the group need '// &
+                            'sectors: give &cyclic n_sectors, or leave the group out')
          return
       end if
       call merge_parts(reader, options, cyclic%n_sectors, raw%mistuning)
@@ -216,8 +217,8 @@ contains
          if (.not. allocated(parts%sector) .or. reader%failed()) return
          if (allocated(raw%cyclic%nodal)) then
             call reader%refuse('cyclic', 'mistuned', '= .true.: /mistuning/sector does not go '// &
-                               'with matrices of nodal diameters; give rows, or matrices of the '// &
-                               'blade')
+                               'with matrices of nodal diameters; give rows, or matrices of '// &
+                               'the blade')
             return
          end if
          do j = 1, size(parts%sector)

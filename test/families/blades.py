@@ -40,14 +40,13 @@ def trial(seed, program, folder):
     case = random_case(rng, law=law, n_sectors=n_sectors, n_pairs=max(1, n_pairs),
                        engine_order=int(rng.integers(-n_sectors, 2 * n_sectors + 1)))
     case["n_harmonics"] = int(rng.integers(1, 8))
-    if n_pairs == 0:
-        case["contact"] = {key: [] for key in case["contact"]}
     parts, scale, change = draw(rng, case, way, float(rng.uniform(0.0, 0.1)))
     whole = annulus(case, change)
     omegas = sorted(float(w) for w in rng.uniform(0.5, 2.5, 3))
     options = {"sampling": "uniform", "n_time": 256} if law == "regularised" else {}
     if n_pairs == 0:
         options = {"sampling": "uniform", "n_time": 32}
+        case["contact"] = {"side_1": []}
         whole.case["contact"] = {}
     (folder / "sectors").mkdir()
     (folder / "annulus").mkdir()
