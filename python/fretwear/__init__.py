@@ -67,9 +67,9 @@ from .stress import Stress
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "Damper", "FretwearError", "InputError", "Mistuning", "Model", "NodalDiameter",
-           "OutputError", "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring",
-           "Steps", "Stress", "__version__", "calibrate", "frf", "mode", "optimise", "resonance",
-           "run", "wear"]
+           "OutputError", "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped",
+           "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf", "mode",
+           "optimise", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -5,7 +5,7 @@ import h5py
 import numpy as np
 from annulus import Annulus
 
-WAYS = ("rows", "blade", "sectors", "full", "all")
+WAYS = ("rows", "blade", "sectors", "full", "together")
 
 
 def low_rank(rng, n, rank, size):
@@ -22,7 +22,7 @@ def draw(rng, case, way, size):
     parts = {}
     change = {key: np.zeros((n_sectors, n, n)) for key in ("stiffness", "mass", "damping")}
     scale = float(rng.choice([1.0, 0.5, -1.0]))
-    if way in ("rows", "all"):
+    if way in ("rows", "together"):
         r = int(rng.integers(1, 4))
         rows = 0.5 * rng.normal(size=(r, n))
         if rng.random() < 0.3:
@@ -40,7 +40,7 @@ def draw(rng, case, way, size):
             change["stiffness"][j] += rows.T @ np.diag(
                 omega**2 * ((1.0 + scale * d[j])**2 - 1.0)) @ rows
             change["damping"][j] += rows.T @ np.diag(2.0 * omega * scale * z[j]) @ rows
-    if way in ("blade", "all"):
+    if way in ("blade", "together"):
         parts["blade_stiffness"] = low_rank(rng, n, int(rng.integers(1, 4)), 3.0)
         parts["blade_mass"] = low_rank(rng, n, int(rng.integers(1, 4)), 0.2)
         parts["stiffness"] = size * rng.uniform(-1.0, 1.0, n_sectors)
@@ -48,9 +48,9 @@ def draw(rng, case, way, size):
         for key in ("stiffness", "mass"):
             change[key] += scale * parts[key][:, None, None] * parts[f"blade_{key}"]
     for j in range(n_sectors):
-        if way not in ("sectors", "full", "all") or rng.random() < 0.3:
+        if way not in ("sectors", "full", "together") or rng.random() < 0.3:
             continue
-        full = way == "full" or (way == "all" and rng.random() < 0.5)
+        full = way == "full" or (way == "together" and rng.random() < 0.5)
         for key, part in (("stiffness", 2.0), ("mass", 0.2), ("damping", 0.02)):
             if rng.random() < 0.3:
                 continue
