@@ -58,6 +58,7 @@ from .errors import (
     RunInterrupted,
     RunStopped,
 )
+from .mistuning import Mistuning
 from .model import ContactPairs, Model, Spring
 from .result import Result
 from .sectors import Air, NodalDiameter, Sectors
@@ -65,10 +66,10 @@ from .steps import Point, Steps
 from .stress import Stress
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "Damper", "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError",
-           "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring",
-           "Steps", "Stress", "__version__", "calibrate", "frf", "mode", "optimise", "resonance",
-           "run", "wear"]
+           "Damper", "FretwearError", "InputError", "Mistuning", "Model", "NodalDiameter",
+           "OutputError", "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped",
+           "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf", "mode",
+           "optimise", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -17,6 +17,7 @@ from ._namelist import literal
 from ._native import Session, unread_parts
 from .elements import Elements, checked_elements, read_elements
 from .errors import InputError, NotBuiltError, OutputError
+from .mistuning import Mistuning, read_mistuning
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
 from .stress import OF_PICTURES, Stress, read_stress
@@ -214,6 +215,8 @@ class Model:
         Frequencies [rad/s], and what multiplies all vibratory loads there.
     stress : Stress, optional
         Rows that give the stress at points, and what these endure.
+    mistuning : Mistuning, optional
+        How sectors differ, for cases with ``cyclic%mistuned``.
     sectors : Sectors, optional
         Makes the model one of equal sectors around an axis. With matrices of nodal diameters M, C
         and K are None.
@@ -245,6 +248,7 @@ class Model:
                  damping_unsymmetric: ArrayLike | None = None,
                  base_dof: ArrayLike | None = None, base_direction: ArrayLike | None = None,
                  load_table: ArrayLike | None = None, stress: Stress | None = None,
+                 mistuning: Mistuning | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
@@ -292,6 +296,12 @@ class Model:
         if stress is not None and not isinstance(stress, Stress):
             raise InputError(f"stress: is a {type(stress).__name__}, must be Stress")
         self.stress = None if stress is None else stress.checked(n)
+        if mistuning is not None and not isinstance(mistuning, Mistuning):
+            raise InputError(f"mistuning: is a {type(mistuning).__name__}, must be Mistuning")
+        if mistuning is not None and self.sectors is None:
+            raise InputError("mistuning: is given without sectors, must have Sectors beside it")
+        self.mistuning = (None if mistuning is None or self.sectors is None
+                          else mistuning.checked(n, self.sectors.n_sectors))
         self._observe = None if observe is None else _rows(observe, n)
         if observe is not None and self._diameter_names() is not None:
             raise InputError("observe: is given beside rows of nodal diameters, must be one of "
@@ -455,6 +465,7 @@ class Model:
                     **{name: found.get(name) for name in _MATRICES},
                     base_dof=found.get("base/dof"), base_direction=found.get("base/direction"),
                     load_table=found.get("load/table"), stress=read_stress(file),
+                    mistuning=read_mistuning(file),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -489,6 +500,9 @@ class Model:
                     pairs[f"contact/{name}"] = strings(words)
             if (table := getattr(self.contact, "table", None)) is not None:
                 pairs["contact/table"] = table
+            if self.mistuning is not None:
+                groups.update((group, {"kind": kind}) for group, kind in
+                              self.mistuning.attributes().items())
             groups.update((one.group, dict(words)) for one in self.elements
                           if (words := one.attributes()))
             write_model_file(path, {**self._datasets(), **pairs, **self._spring_datasets()},
@@ -527,6 +541,8 @@ class Model:
             found.update(self.sectors.datasets())
         if self.stress is not None:
             found.update(self.stress.datasets())
+        if self.mistuning is not None:
+            found.update(self.mistuning.datasets())
         if self._observe is not None:
             found["observe/name"] = strings(self._observe[0])
             found["observe/matrix"] = self._observe[1]
@@ -552,6 +568,9 @@ class Model:
         for one in self.elements:
             for name, word in one.attributes().items():
                 session.put_texts(f"{one.group}/{name}", [word])
+        if self.mistuning is not None:
+            for group, kind in self.mistuning.attributes().items():
+                session.put_texts(f"{group}/kind", [kind])
         for name in ("title", "unit_system"):
             if getattr(self, name):
                 session.put_texts(name, [getattr(self, name)])

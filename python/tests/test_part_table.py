@@ -48,6 +48,13 @@ def whole(**more: Any) -> fw.Model:
                                      [1.0, 2.0], [2.0, 3.0], np.zeros((2, 3)), [0, 1]), **more)
 
 
+def mistuned() -> fw.Model:
+    rows = np.ones((2, 6))
+    return whole(sectors=fw.Sectors(3, [1], [-4]), mistuning=fw.Mistuning(
+        rows, [1.0, 2.0], [0.1, 0.0, -0.1], np.zeros((3, 2)), [0.1, 0.0, 0.0], [0.0, 0.0, 0.1],
+        EYE, EYE, {0: {"K": EYE, "M": EYE, "C": EYE}, 2: {"K": EYE, "kind": "full"}}))
+
+
 def nodal() -> fw.Model:
     one = fw.NodalDiameter(EYE, EYE, EYE, EYE, 0.0 * EYE, EYE[0], EYE[0], EYE[0], EYE[0],
                            observe={"tip": EYE[0]})
@@ -62,6 +69,7 @@ MODELS = {
                                             normal_law=["power"])),
     "sector": lambda: whole(sectors=fw.Sectors(3, [1], [-4], air=fw.Air({0: np.eye(2)},
                                                                         modes=EYE[:2]))),
+    "mistuned": mistuned,
     "supports": lambda: whole(base_dof=[1, -2]),
     "ground": lambda: whole(base_direction=EYE[0]),
     "nodal": nodal}
@@ -83,9 +91,10 @@ def names_in(path: Path) -> set[str]:
     with h5py.File(path) as file:
         file.visititems(lambda name, item: found.add(name) if isinstance(item, h5py.Dataset)
                         else None)
-        for group in ("", "contact", "cyclic", "polynomial"):
+        for group in ("", "contact", "cyclic", "polynomial", "mistuning/sector/2"):
             if group in file or not group:
                 found |= {f"{group}@{name}" for name in file[group or "/"].attrs}
+    found = {re.sub(r"^mistuning/sector/\d+", "mistuning/sector/M", name) for name in found}
     found = {re.sub(r"^nodal_diameter/\d+", "nodal_diameter/K", name) for name in found}
     return {re.sub(r"^(aero/\w+)/-?\d+", r"\1/M", name) for name in found}
 

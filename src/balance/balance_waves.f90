@@ -6,8 +6,17 @@
 !> a block of the size of one sector for each harmonic and nodal diameter. The mean is over the
 !> sectors where a coordinate is active. Where others are solved at once they act as zeros in the
 !> right-hand side, and their part of the solution is dropped.
+!>
+!> What sectors have beside each other, A = W^T D W on rows of each, couples the waves:
+!>
+!>   (M + W^T D W)^-1 = M^-1 - M^-1 W^T D (I + Gamma D)^-1 W M^-1,   Gamma = W M^-1 W^T,
+!>
+!> with Gamma block circulant, of the order of the rows of all sectors.
 submodule(fw_balance_state) fw_balance_waves
    use fw_force_law, only: pair_mixed, pair_open
+   use fw_kinds, only: pi
+   use fw_lapack, only: zgetrf, zgetrs
+   use fw_size_options, only: sizes
    implicit none (type, external)
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
@@ -74,7 +83,84 @@ contains
             call factors%factor()
          end associate
       end do
+      call build_own(self, h)
    end subroutine build_harmonic
+
+   !> I + Gamma D of a harmonic.
+   subroutine build_own(self, h)
+      class(balance_state), intent(inout) :: self
+      integer, intent(in) :: h
+      complex(wp), allocatable :: answer(:, :), gamma(:, :, :), rows(:, :), wave(:, :, :)
+      integer :: a, i, info, j, k, n, r
+
+      r = self%problem%structure%n_own()
+      n = self%problem%structure%n_alike
+      associate (own => self%preconditioner%own(h), structure => self%problem%structure)
+         own%is_there = r > 0 .and. n*r <= sizes%whole_sectors
+         if (.not. own%is_there) return
+         if (.not. allocated(own%matrix)) allocate (own%matrix(n*r, n*r), own%pivot(n*r), &
+                                                    own%block(r, r, n), own%rows(r, n), &
+                                                    own%force(n*r))
+         allocate (rows(r, structure%n_slots), answer(structure%n_slots, r))
+         allocate (wave(r, r, n), gamma(r, r, n))
+         do k = 0, n - 1
+            call structure%own_rows(k, rows)
+            do a = 1, r
+               answer(:, a) = conjg(rows(a, :))
+               call self%preconditioner%wave(k + 1, h)%solve(answer(:, a))
+            end do
+            wave(:, :, k + 1) = matmul(rows, answer)
+         end do
+         gamma = zero
+         do i = 0, n - 1
+            do k = 0, n - 1
+               gamma(:, :, i + 1) = gamma(:, :, i + 1) + wave(:, :, k + 1)/n* &
+                  exp(cmplx(0.0_wp, -2.0_wp*pi*modulo(i*k, n)/n, wp))
+            end do
+         end do
+         call structure%own_block(self%structure_state, h, own%block)
+         do j = 0, n - 1
+            do i = 0, n - 1
+               own%matrix(i*r + 1:(i + 1)*r, j*r + 1:(j + 1)*r) = &
+                  matmul(gamma(:, :, modulo(i - j, n) + 1), own%block(:, :, j + 1))
+            end do
+         end do
+         do i = 1, n*r
+            own%matrix(i, i) = own%matrix(i, i) + one
+         end do
+         call zgetrf(n*r, n*r, own%matrix, n*r, own%pivot, info)
+         own%is_there = info == 0
+      end associate
+   end subroutine build_own
+
+   !> Take off what they make of the answer of the waves.
+   subroutine correct_by_own(self, h)
+      class(balance_state), intent(inout) :: self
+      integer, intent(in) :: h
+      integer :: info, j, m, n, r
+
+      n = self%problem%structure%n_alike
+      associate (own => self%preconditioner%own(h), factors => self%preconditioner, &
+                 structure => self%problem%structure)
+         r = size(own%rows, 1)
+         m = n*r
+         call structure%read_own(factors%sectors(:, :, h), own%rows)
+         own%force = reshape(own%rows, [m])
+         call zgetrs('N', m, 1, own%matrix, m, own%pivot, own%force, m, info)
+         do j = 1, n
+            own%rows(:, j) = matmul(own%block(:, :, j), own%force((j - 1)*r + 1:j*r))
+         end do
+         factors%answer(:, :, h) = factors%sectors(:, :, h)
+         factors%sectors(:, :, h) = zero
+         call structure%add_own(own%rows, factors%sectors(:, :, h))
+         call structure%find_waves(factors%sectors(:, :, h), factors%waves(:, :, h))
+         do j = 1, n
+            call factors%wave(j, h)%solve(factors%waves(:, j, h))
+         end do
+         call structure%add_waves(factors%waves(:, :, h), factors%sectors(:, :, h))
+         factors%sectors(:, :, h) = factors%answer(:, :, h) - factors%sectors(:, :, h)
+      end associate
+   end subroutine correct_by_own
 
    subroutine count_active(self, n_active, held)
       class(balance_state), intent(in) :: self
@@ -236,6 +322,7 @@ contains
             call factors%wave(j, h)%solve(factors%waves(:, j, h))
          end do
          call structure%add_waves(factors%waves(:, :, h), factors%sectors(:, :, h))
+         if (factors%own(h)%is_there) call correct_by_own(self, h)
          do j = 1, self%active%n_active
             in(j) = factors%sectors(structure%slot(self%active%used(j)), &
                                     structure%sector(self%active%used(j)), h)

@@ -34,6 +34,8 @@ module fw_joint
       !> Of a cyclic structure: the coordinates of every nodal diameter, and, where all sectors are
       !> solved for, which row of which sector each is (from 0), see `lay_out_all`.
       type(cyclic_relative) :: cyclic
+      !> The same without rows in which sectors differ, where there are such.
+      type(cyclic_relative), allocatable :: tuned
       integer, allocatable :: row_in_sector(:), sector(:)
       !> Of a structure that is its only sector: the same as of one that is none.
       type(relative_type), allocatable :: alone
@@ -54,7 +56,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: side_1(:), side_2(:), sector_2(:), first(:)
       logical, allocatable :: moving(:), rigid(:)
-      integer :: i, c, k, n_pairs, n_rows, n_springs, n_others
+      integer :: i, c, k, n_pairs, n_rows, n_springs, n_others, n_own
 
       ! Before the rows are numbered: what never moves needs none.
       call find_moving_dofs(model, contact, springs, elements, moving)
@@ -96,11 +98,20 @@ contains
       end if
       n_others = n_rows + n_springs
       call list_elements(elements, n_others, side_1, side_2, sector_2, self%element_row)
+      n_own = 0
+      if (allocated(model%cyclic%deviation)) n_own = size(model%cyclic%deviation%rows, 1)
       if (model%cyclic%is_mistuned) call repeat_rows(model%cyclic%n_sectors, n_pairs, n_rows, &
-                                                     size(side_1) - n_others, self)
+                                                     size(side_1) - n_others + n_own, self)
       self%half_wave_symmetric = symmetric(model, contact, springs, elements, self)
       if (model%cyclic%is_cyclic) then
-         call new_cyclic_relative(model, side_1, side_2, sector_2, self%cyclic)
+         if (n_own > 0) then
+            allocate (self%tuned)
+            call new_cyclic_relative(model, side_1, side_2, sector_2, self%tuned)
+            call new_cyclic_relative(model, side_1, side_2, sector_2, self%cyclic, &
+                                     model%cyclic%deviation%rows)
+         else
+            call new_cyclic_relative(model, side_1, side_2, sector_2, self%cyclic)
+         end if
          if (.not. model%cyclic%is_alone) return
          allocate (self%alone)
          call new_relative(model%n_dof, side_1, side_2, self%alone)
@@ -296,6 +307,7 @@ contains
             call couple_by(model%cyclic%coriolis)
             call couple_by(model%cyclic%circulatory)
             call couple_by(model%cyclic%structural)
+            if (allocated(model%cyclic%deviation)) call couple_rows(model%cyclic%deviation%rows)
             if (.not. allocated(model%cyclic%speed)) cycle
             associate (speed => model%cyclic%speed)
                call couple_by(speed%coriolis)
@@ -333,6 +345,14 @@ contains
 
          if (allocated(matrix)) moving(1:) = moving(1:) .or. abs(matrix(:, i)) > 0.0_wp
       end subroutine couple_by
+
+      !> What dof i moves by rows, all of which are taken for coupled.
+      subroutine couple_rows(rows)
+         real(wp), intent(in) :: rows(:, :)
+
+         if (all(abs(rows(:, i)) <= 0.0_wp)) return
+         moving(1:) = moving(1:) .or. any(abs(rows) > 0.0_wp, dim=1)
+      end subroutine couple_rows
 
       subroutine couple(side_1, side_2)
          integer, intent(in) :: side_1, side_2

@@ -9,6 +9,13 @@ module fw_kept_factors
 
    public :: kept_factors
 
+   !> Factors of I + Gamma D of a harmonic (fw_balance_waves), and scratch.
+   type :: own_factors
+      logical :: is_there = .false.
+      complex(wp), allocatable :: matrix(:, :), block(:, :, :), rows(:, :), force(:)
+      integer, allocatable :: pivot(:)
+   end type own_factors
+
    type :: kept_factors
       type(preconditioner_lu_type), allocatable :: harmonic(:)
       !> In place of them: two matrices for all harmonics; whether the factors in use are these.
@@ -19,7 +26,9 @@ module fw_kept_factors
       !> Of waves around equal sectors in their place (n_sectors, n_retained), with scratch (slots
       !> of a sector, n_sectors, n_retained).
       type(preconditioner_lu_type), allocatable :: wave(:, :)
-      complex(wp), allocatable :: sectors(:, :, :), waves(:, :, :)
+      complex(wp), allocatable :: sectors(:, :, :), waves(:, :, :), answer(:, :, :)
+      !> Of what sectors have beside each other (n_retained).
+      type(own_factors), allocatable :: own(:)
       !> Coordinates for which they were built (first n entries).
       integer :: n = 0
       integer, allocatable :: coordinate(:)
@@ -55,9 +64,10 @@ contains
       class(kept_factors), intent(inout) :: self
       integer, intent(in) :: n_slots, n_sectors, n_harmonics
 
-      allocate (self%wave(n_sectors, n_harmonics))
+      allocate (self%wave(n_sectors, n_harmonics), self%own(n_harmonics))
       allocate (self%sectors(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
       allocate (self%waves(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
+      allocate (self%answer(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
    end subroutine reserve_waves
 
 end module fw_kept_factors

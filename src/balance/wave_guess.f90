@@ -99,8 +99,10 @@ contains
       complex(wp), intent(in) :: q(:)
       real(wp), intent(out) :: product(:)
       complex(wp), allocatable :: sectors(:, :), waves(:, :), matrix(:, :)
-      integer :: j
+      complex(wp), allocatable :: rows(:, :), own(:, :, :)
+      integer :: j, r
 
+      r = system%problem%structure%n_own()
       associate (structure => system%problem%structure)
          allocate (sectors(structure%n_slots, structure%n_alike))
          allocate (waves(structure%n_slots, structure%n_alike))
@@ -108,12 +110,19 @@ contains
          do j = 1, structure%n_alike
             sectors(:, j) = q(structure%coordinate(:, j))
          end do
+         allocate (rows(r, structure%n_alike), own(r, r, structure%n_alike))
+         call structure%read_own(sectors, rows)
+         call structure%own_block(system%structure_state, 1, own)
          call structure%find_waves(sectors, waves)
          do j = 1, structure%n_alike
             call structure%wave_block(system%structure_state, 1, j - 1, matrix)
             waves(:, j) = matmul(matrix, waves(:, j))
          end do
          call structure%add_waves(waves, sectors)
+         do j = 1, structure%n_alike
+            rows(:, j) = matmul(own(:, :, j), rows(:, j))
+         end do
+         call structure%add_own(rows, sectors)
          do j = 1, structure%n_alike
             product(structure%coordinate(:, j)) = real(sectors(:, j), wp)
          end do

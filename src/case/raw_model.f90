@@ -8,6 +8,7 @@ module fw_raw_model
    use fw_kinds, only: wp
    use fw_law_text, only: all_laws
    use fw_laws, only: law_words
+   use fw_mistuning_parts, only: mistuning_parts
    use fw_stress_parts, only: stress_parts
    use fw_normal_law, only: normal_words
    use fw_part_keys, only: part_keys
@@ -55,6 +56,8 @@ module fw_raw_model
       !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
       real(wp), allocatable :: coriolis(:, :)
       type(stress_parts) :: stress
+      !> How sectors differ from the tuned one.
+      type(mistuning_parts), allocatable :: mistuning
       !> Hysteretic damping, symmetric (n_dof, n_dof) [force/length].
       real(wp), allocatable :: structural_damping(:, :)
       !> Of any shape (n_dof, n_dof): stiffness per rotation speed, stiffness and damping.
@@ -94,6 +97,8 @@ contains
       call bind_base(self, to)
       call bind_observed(self, to)
       call self%cyclic%bind_parts(to)
+      if (.not. allocated(self%mistuning)) allocate (self%mistuning)
+      call self%mistuning%bind_parts(self%cyclic%n_sectors, to)
       call self%stress%bind_parts(to)
       call note_mesh(to)
    end subroutine bind_parts

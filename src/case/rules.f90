@@ -120,7 +120,7 @@ module fw_rules
    !> What waves around a cyclic structure, and the motion of all its sectors, are not solved with.
    type(rule_type), parameter :: of_sectors(*) = [ &
       rule_type('cyclic%mistuned = .true.', &
-                "case%analysis other than 'frf', 'point' or 'wear'", &
+                "case%analysis other than 'frf', 'point', 'wear' or 'modes'", &
                 'use one of them, or leave mistuned out'), &
       rule_type('cyclic%mistuned = .true.', "harmonics%method other than 'hbm'", "use 'hbm'"), &
       rule_type('cyclic%mistuned = .true.', 'harmonics%accuracy', &

@@ -18,6 +18,8 @@ module fw_natural_modes
    private
 
    public :: natural_modes, find_natural_modes
+   ! For those of all sectors.
+   public :: add_springs, held_basis
 
    !> Frequencies in ascending order [rad/s], NaN where there are fewer (n_modes, n_diameters).
    type :: natural_modes
@@ -163,12 +165,15 @@ contains
       integer, intent(in) :: k
       complex(wp), intent(inout) :: stiffness(:, :)
       complex(wp), allocatable :: rows(:, :)
-      integer :: i
+      integer :: i, n
 
       associate (springs => case%springs)
          if (springs%n_springs == 0) return
-         call sector_rows(case%model, k, springs%side_1, springs%side_2, springs%sector_2, rows)
-         do i = 1, springs%n_springs
+         ! Those of all sectors are those of the first.
+         n = springs%n_springs/case%model%cyclic%n_solved()
+         call sector_rows(case%model, k, springs%side_1(:n), springs%side_2(:n), &
+                          springs%sector_2(:n), rows)
+         do i = 1, n
             if (springs%power(i) /= 1) cycle
             call add_sector_spring(rows(i, :), springs%coefficient(i), stiffness)
          end do

@@ -236,7 +236,8 @@ contains
       end associate
       if (case%model%cyclic%is_mistuned) then
          allocate (all)
-         call new_all_sectors(case%model, joint%cyclic, fourier%harmonic, range, means, all, error)
+         call new_all_sectors(case%model, joint%cyclic, fourier%harmonic, range, means, all, &
+                              error, joint%tuned)
          call move_alloc(all, structure)
          return
       end if

@@ -3,9 +3,10 @@ module fw_run_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use fw_analysis, only: analysis, run_type
    use fw_case, only: analyses, case_type
-   use fw_cyclic_group, only: modes_group
+   use fw_cyclic_group, only: mistuned_group, modes_group
    use fw_error, only: error_type
    use fw_kinds, only: pi, wp
+   use fw_mistuned_modes, only: find_mistuned_modes, mistuned_modes
    use fw_natural_modes, only: find_natural_modes, natural_modes
    use fw_remarks, only: remark_unused
    use fw_solver_options, only: unit_hertz, unit_words
@@ -44,6 +45,10 @@ contains
       associate (unused => self)
       end associate
       call remark_unused(case, run%summary%remarks)
+      if (case%model%cyclic%is_mistuned) then
+         call list_all_sectors(case, run, error)
+         return
+      end if
       call find_natural_modes(case, min(case%model%cyclic%n_modes, most_of(case)), modes, error)
       if (allocated(error)) return
       group%nodal_diameter = modes%nodal_diameter
@@ -69,6 +74,35 @@ contains
          call append(run%table, name//'closed'//text)
       end do
    end subroutine start
+
+   !> Those of all sectors together.
+   subroutine list_all_sectors(case, run, error)
+      type(case_type), intent(in) :: case
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(out) :: error
+      type(mistuned_modes) :: modes
+      type(mistuned_group) :: group
+      character(:), allocatable :: text
+      integer :: n
+
+      n = case%model%cyclic%n_sectors*min(case%model%cyclic%n_modes, most_of(case))
+      call find_mistuned_modes(case, n, modes, error)
+      if (allocated(error)) return
+      group%open = reshape(modes%open, [n, 1])
+      group%closed = reshape(modes%closed, [n, 1])
+      group%open_content = modes%open_content
+      group%closed_content = modes%closed_content
+      call run%writer%add(group, error)
+      if (allocated(error)) return
+      allocate (run%table(0))
+      call append(run%table, 'natural frequencies ['//trim(unit_words(case%sweep%unit))// &
+                  '] of all sectors')
+      call line_of(case, modes%open, -1.0_wp, huge(1.0_wp), text)
+      call append(run%table, 'open'//text)
+      if (case%contact%n_pairs == 0) return
+      call line_of(case, modes%closed, -1.0_wp, huge(1.0_wp), text)
+      call append(run%table, 'closed'//text)
+   end subroutine list_all_sectors
 
    !> No vibration is built.
    subroutine check(self, case, error)

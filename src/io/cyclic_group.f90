@@ -6,7 +6,7 @@ module fw_cyclic_group
    implicit none (type, external)
    private
 
-   public :: modes_group, write_cyclic
+   public :: mistuned_group, modes_group, write_cyclic
 
    !> Natural frequencies of the nodal diameters, NaN where there are fewer.
    type, extends(result_group) :: modes_group
@@ -18,6 +18,16 @@ module fw_cyclic_group
    contains
       procedure :: write => write_modes
    end type modes_group
+
+   !> Natural frequencies of all sectors together.
+   type, extends(result_group) :: mistuned_group
+      !> (n_modes, 1) [rad/s].
+      real(wp), allocatable :: open(:, :), closed(:, :)
+      !> Share of each nodal diameter (n_diameters, n_modes).
+      real(wp), allocatable :: open_content(:, :), closed_content(:, :)
+   contains
+      procedure :: write => write_mistuned
+   end type mistuned_group
 
 contains
 
@@ -55,5 +65,22 @@ contains
       call to%put('/modes/closed_damping', self%closed_damping, '1', 'diameter mode', &
                   'damping of them, over the critical one')
    end subroutine write_modes
+
+   subroutine write_mistuned(self, to)
+      class(mistuned_group), intent(in) :: self
+      type(group_writer), intent(inout) :: to
+      integer :: k
+
+      call to%put('/modes/nodal_diameter', [(k, k=0, size(self%open_content, 1) - 1)], '', &
+                  'diameter', 'nodal diameter')
+      call to%put('/modes/open', self%open, 'rad/s', 'disk mode', &
+                  'natural frequencies of all sectors without contact')
+      call to%put('/modes/closed', self%closed, 'rad/s', 'disk mode', &
+                  'natural frequencies of all sectors with every pair closed')
+      call to%put('/modes/open_content', self%open_content, '1', 'mode diameter', &
+                  'share of each nodal diameter in the modes without contact')
+      call to%put('/modes/closed_content', self%closed_content, '1', 'mode diameter', &
+                  'share of each nodal diameter in the modes with every pair closed')
+   end subroutine write_mistuned
 
 end module fw_cyclic_group

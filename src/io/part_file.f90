@@ -27,6 +27,7 @@ module fw_part_file
       procedure, private :: is_needed
       procedure, private :: read_numbers
       procedure, private :: read_single
+      procedure, private :: read_spread
       procedure, private :: check_extents
       procedure, private :: check_complex
       procedure, private :: check_finite
@@ -120,6 +121,14 @@ contains
             return
          end if
       end if
+      if (part%shape == 'sector row' .and. found) then
+         call get_shape(self%file, name, dims, self%error)
+         if (allocated(self%error)) return
+         if (size(dims) == 1) then
+            call self%read_spread(part, name)
+            return
+         end if
+      end if
       if (part%kind == 'integer') then
          call read_dataset(self%file, name, rank, self%dims, self%integers, self%error)
       else
@@ -150,6 +159,25 @@ contains
       end if
       self%dims = [n]
    end subroutine read_single
+
+   !> One value of each sector for all rows.
+   subroutine read_spread(self, part, name)
+      class(file_source), intent(inout) :: self
+      type(part_type), intent(in) :: part
+      character(*), intent(in) :: name
+      real(wp), allocatable :: values(:)
+      integer :: n, r
+
+      call read_dataset(self%file, name, 1, self%dims, self%reals, self%error)
+      if (allocated(self%error)) return
+      n = self%dims(1)
+      r = max(1, self%extent_of(part%shape(8:)))
+      values = self%reals
+      deallocate (self%reals)
+      allocate (self%reals(n*r))
+      self%reals = reshape(spread(values, 1, r), [n*r])
+      self%dims = [r, n]
+   end subroutine read_spread
 
    !> Refuse other extents than those that are known, and take those that are not.
    subroutine check_extents(self, part)

@@ -16,7 +16,7 @@ module fw_read_case
    use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_elements, only: read_contact, read_elements, read_springs
-   use fw_read_cyclic, only: check_sectors, read_cyclic
+   use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
    use fw_read_options, only: read_campbell, read_harmonics, read_mission, read_mode, read_stress, &
@@ -412,6 +412,8 @@ contains
       if (allocated(error)) return
       call read_cyclic(reader, raw%cyclic, n_dof, analyses(case%analysis)%has_points, &
                        case%model%cyclic)
+      if (.not. allocated(raw%mistuning)) allocate (raw%mistuning)
+      call read_mistuning(reader, raw, case%model%cyclic)
       options%speed_order = speed_order_of(reader)
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &

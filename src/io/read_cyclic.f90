@@ -8,12 +8,15 @@ module fw_read_cyclic
    use fw_cyclic_keys, only: bind_interfaces, bind_sectors, no_order
    use fw_laws, only: facts_of
    use fw_force_law, only: law_facts
+   use fw_read_mistuning, only: read_mistuning
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    implicit none (type, external)
    private
 
    public :: read_cyclic, check_sectors
+   ! Read behind them.
+   public :: read_mistuning
 
 contains
 

@@ -6,7 +6,8 @@
 !>   Z_n q = sum_k z_k**j Z_n,k Q_k,   Q_k = 1/N sum_j z_k**-j q_j,   z_k = exp(-2 pi i k/N),
 !>
 !> condensed as those of a wave are. k and N - k differ in every harmonic above 0, where the
-!> amplitudes of the sectors are complex. The load is a wave.
+!> amplitudes of the sectors are complex. The load is a wave. What sectors have beside each other
+!> acts on rows of each (fw_ring_deviation), its mean in every wave.
 module fw_all_sectors
    use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_cyclic_data, only: cyclic_type
@@ -15,6 +16,7 @@ module fw_all_sectors
    use fw_kinds, only: wp
    use fw_lapack, only: zgemv
    use fw_model, only: model_type
+   use fw_ring_deviation, only: ring_deviation
    use fw_ring_fft, only: ring_fft
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
@@ -40,6 +42,8 @@ module fw_all_sectors
       type(sector_means), private :: means
       !> Over the sectors, of the coordinates and of what is observed.
       type(ring_fft), private :: ring, observed_ring
+      !> Not allocated where the sectors are alike.
+      type(ring_deviation), allocatable, private :: deviation
    contains
       procedure :: new_state
       procedure :: at
@@ -62,6 +66,11 @@ module fw_all_sectors
       procedure :: wave_block
       procedure :: find_waves
       procedure :: add_waves
+      procedure :: n_own
+      procedure :: own_rows
+      procedure :: own_block
+      procedure :: read_own
+      procedure :: add_own
    end type all_sectors
 
    type, extends(structure_state) :: all_sectors_state
@@ -71,14 +80,20 @@ module fw_all_sectors
       !> Scratch of products: coordinates (n_coordinates, n_retained), and those of the sectors and
       !> of the waves (n_slots, n_sectors, n_retained).
       complex(wp), allocatable, private :: amplitude(:, :), in(:, :, :), out(:, :, :)
+      !> What sectors have beside their mean (n_own, n_own, n_sectors, n_retained), and the rows
+      !> that it acts on (n_own, n_sectors, n_retained).
+      complex(wp), allocatable, private :: own(:, :, :, :), rows(:, :, :)
    end type all_sectors_state
 
    ! Its bases (fw_all_sectors_setup).
    interface
       !> Bases of all nodal diameters, and transforms between sectors and waves.
-      module subroutine new_all_sectors(model, relative, harmonic, omega_range, means, self, error)
+      module subroutine new_all_sectors(model, relative, harmonic, omega_range, means, self, &
+                                        error, tuned)
          type(model_type), intent(in) :: model
          type(cyclic_relative), intent(in) :: relative
+         !> The same without the rows in which sectors differ.
+         type(cyclic_relative), intent(in), optional :: tuned
          !> Harmonics in use.
          integer, intent(in) :: harmonic(:)
          !> Lowest and highest frequency that will be asked for [rad/s].
@@ -171,6 +186,9 @@ contains
       end do
       allocate (all%wave(m, m, n, nh), all%in(m, n, nh), all%out(m, n, nh), source=zero)
       allocate (all%amplitude(self%n_coordinates, nh), source=zero)
+      associate (r => self%n_own())
+         allocate (all%own(r, r, n, nh), all%rows(r, n, nh), source=zero)
+      end associate
       call all%reserve_loads(self%n_coordinates, nh)
       allocate (all%used(self%n_coordinates), source=0)
       call move_alloc(all, state)
@@ -239,6 +257,11 @@ contains
             if (is_mirrored(self, k, state%point(k + 1, h))) state%wave(:, :, k + 1, h) = &
                transpose(state%wave(:, :, self%n_alike - k + 1, h))
          end do
+         if (allocated(self%deviation)) then
+            call self%deviation%form(1.0_wp, state%point(1, h)%theta, state%point(1, h)%s, &
+                                     state%own(:, :, :, h))
+            call self%deviation%add_mean(state%own(:, :, :, h), state%wave(:, :, :, h))
+         end if
          ! The load is delayed from sector to sector.
          k = self%cyclic%nodal_diameter(self%harmonic(h))
          do task = 1, self%n_alike
@@ -276,12 +299,16 @@ contains
       !$omp parallel do default(none) shared(self, state, m) private(h, k) &
       !$omp if(self%n_coordinates >= coordinates_for_threads)
       do h = 1, size(self%harmonic)
+         if (allocated(self%deviation)) call self%deviation%read_rows(state%in(:, :, h), &
+                                                                      state%rows(:, :, h))
          call self%ring%find_waves(state%in(:, :, h), state%out(:, :, h))
          do k = 1, self%n_alike
             call zgemv('N', m, m, one, state%wave(1, 1, k, h), m, state%out(1, k, h), 1, zero, &
                        state%in(1, k, h), 1)
          end do
          call self%ring%add_waves(state%in(:, :, h), state%out(:, :, h))
+         if (allocated(self%deviation)) call self%deviation%add_rows( &
+            state%rows(:, :, h), state%out(:, :, h), state%own(:, :, :, h))
       end do
       !$omp end parallel do
    end subroutine multiply_waves
@@ -415,15 +442,27 @@ contains
       real(wp), intent(in) :: q(*)
       real(wp), intent(inout) :: slope(*)
       complex(wp), allocatable :: amplitude(:, :), waves(:, :), slopes(:, :)
+      complex(wp), allocatable :: rows(:, :), own(:, :, :)
+      type(harmonic_point) :: by
       integer :: h, k, m
 
       m = self%n_coordinates
       allocate (amplitude(m, size(self%harmonic)))
       allocate (waves(self%n_slots, self%n_alike), slopes(self%n_slots, self%n_alike))
       call amplitudes_of(self%harmonic, self%column, m, q, m, amplitude)
+      if (allocated(self%deviation)) allocate (rows(self%n_own(), self%n_alike), &
+                                               own(self%n_own(), self%n_own(), self%n_alike))
       select type (state)
       type is (all_sectors_state)
          do h = 1, size(self%harmonic)
+            if (allocated(self%deviation)) then
+               do k = 1, self%n_alike
+                  waves(:, k) = amplitude(self%coordinate(:, k), h)
+               end do
+               call self%deviation%read_rows(waves, rows)
+               by = slopes_of(state%point(1, h), state%self_excitation, parameter)
+               call self%deviation%form(0.0_wp, by%theta, by%s, own)
+            end if
             call waves_of(self, amplitude(:, h), waves)
             do k = 0, self%n_alike - 1
                associate (point => state%point(k + 1, h))
@@ -433,6 +472,7 @@ contains
                end associate
             end do
             call self%ring%add_waves(slopes, waves)
+            if (allocated(self%deviation)) call self%deviation%add_rows(rows, waves, own)
             do k = 1, self%n_alike
                amplitude(self%coordinate(:, k), h) = waves(:, k)
             end do
@@ -440,6 +480,54 @@ contains
       end select
       call coefficients_of(self%harmonic, self%column, m, m, amplitude, slope)
    end subroutine derivative
+
+   pure integer function n_own(self)
+      class(all_sectors), intent(in) :: self
+
+      n_own = 0
+      if (allocated(self%deviation)) n_own = self%deviation%n_rows
+   end function n_own
+
+   subroutine own_rows(self, k, rows)
+      class(all_sectors), intent(in) :: self
+      integer, intent(in) :: k
+      complex(wp), intent(out) :: rows(:, :)
+
+      rows = zero
+      if (allocated(self%deviation)) rows(:, :size(self%deviation%wave, 2)) = &
+         self%deviation%wave(:, :, k + 1)
+   end subroutine own_rows
+
+   subroutine own_block(self, state, h, matrix)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out) :: matrix(:, :, :)
+
+      associate (unused => self)
+      end associate
+      select type (state)
+      type is (all_sectors_state)
+         matrix = state%own(:, :, :, h)
+      end select
+   end subroutine own_block
+
+   subroutine read_own(self, sectors, rows)
+      class(all_sectors), intent(in) :: self
+      complex(wp), intent(in) :: sectors(:, :)
+      complex(wp), intent(out) :: rows(:, :)
+
+      rows = zero
+      if (allocated(self%deviation)) call self%deviation%read_rows(sectors, rows)
+   end subroutine read_own
+
+   subroutine add_own(self, rows, sectors)
+      class(all_sectors), intent(in) :: self
+      complex(wp), intent(in) :: rows(:, :)
+      complex(wp), intent(inout) :: sectors(:, :)
+
+      if (allocated(self%deviation)) call self%deviation%add_rows(rows, sectors)
+   end subroutine add_own
 
    pure real(wp) function static_stiffness(self, coordinate)
       class(all_sectors), intent(in) :: self

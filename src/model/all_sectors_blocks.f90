@@ -13,21 +13,33 @@ contains
       type is (all_sectors_state)
          call fill_block(self, state%wave(:, :, :, h), [(j, j=1, self%n_coordinates)], &
                          self%n_coordinates, matrix)
+         if (allocated(self%deviation)) call self%deviation%add_block( &
+            state%own(:, :, :, h), self%coordinate, self%coordinate, matrix)
       end select
    end procedure block_of_all
 
    !> The same between the coordinates that are active, condensed ones behind them.
    module procedure block_in_use
+      integer, allocatable :: row(:, :)
+      integer :: i
 
       select type (state)
       type is (all_sectors_state)
          call fill_block(self, state%wave(:, :, :, h), state%used(:state%n_used), &
                          state%n_active, matrix)
+         if (.not. allocated(self%deviation)) return
+         allocate (row(self%n_slots, self%n_alike), source=0)
+         do i = 1, state%n_used
+            row(self%slot(state%used(i)), self%sector(state%used(i))) = i
+         end do
+         call self%deviation%add_block(state%own(:, :, :, h), row, &
+                                       merge(row, 0, row <= state%n_active), matrix)
       end select
    end procedure block_in_use
 
    !> The mean over the waves, each with its own reduction: what one sector has of itself alone.
    module procedure mass
+      complex(wp), allocatable :: own(:, :, :), block(:, :)
       integer :: j, k
 
       matrix = 0.0_wp
@@ -38,12 +50,18 @@ contains
                real(self%basis(basis_of(self, k))%blocks(:self%n_slots, :, 2), wp)/self%n_alike
          end do
       end do
+      if (.not. allocated(self%deviation)) return
+      allocate (own(self%n_own(), self%n_own(), self%n_alike))
+      allocate (block(size(matrix, 1), size(matrix, 2)), source=zero)
+      call self%deviation%form(0.0_wp, -one, 0.0_wp, own)
+      call self%deviation%add_block(own, self%coordinate, self%coordinate, block)
+      matrix = matrix + real(block, wp)
    end procedure mass
 
    !> Stiffness, mass and damping of waves one by one; those above half of the sectors run the
    !> other way and are the conjugates of their mirror images.
    module procedure parts
-      complex(wp), allocatable :: wave(:, :, :, :), rows(:, :, :), between(:, :, :)
+      complex(wp), allocatable :: wave(:, :, :, :), rows(:, :, :), between(:, :, :), own(:, :, :)
       integer :: every(self%n_coordinates), j, k, m, n, n_rows
 
       m = self%n_slots
@@ -70,6 +88,16 @@ contains
       call fill_block(self, wave(:, :, :, 1), every, self%n_coordinates, stiffness)
       call fill_block(self, wave(:, :, :, 2), every, self%n_coordinates, mass)
       call fill_block(self, wave(:, :, :, 3), every, self%n_coordinates, damping)
+      if (allocated(self%deviation)) then
+         allocate (own(self%n_own(), self%n_own(), n))
+         call self%deviation%form(1.0_wp, zero, 0.0_wp, own)
+         call self%deviation%add_block(own, self%coordinate, self%coordinate, stiffness)
+         call self%deviation%form(0.0_wp, -one, 0.0_wp, own)
+         call self%deviation%add_block(own, self%coordinate, self%coordinate, mass)
+         call self%deviation%form(0.0_wp, zero, 1.0_wp, own)
+         call self%deviation%add_block(own/(0.0_wp, 1.0_wp), self%coordinate, self%coordinate, &
+                                       damping)
+      end if
       call between_sectors(self, rows, between)
       do j = 1, self%n_coordinates
          do k = 1, n

@@ -1,6 +1,7 @@
 !> All sectors at once: bases of all nodal diameters, and the numbers of the coordinates.
 submodule(fw_all_sectors) fw_all_sectors_setup
    use fw_cyclic_data, only: nodal_matrices
+   use fw_ring_deviation, only: new_ring_deviation
    use fw_sector, only: sector_at
    implicit none (type, external)
 
@@ -16,8 +17,16 @@ contains
       call find_bases(model, relative, omega_range, self, error)
       if (allocated(error)) return
       call find_norms(self)
-      call self%means%take(model, relative, means, self%basis, error)
-      if (allocated(error)) return
+      if (present(tuned)) then
+         ! The stiffness of rigid laws is that of the tuned disk, whose rows nothing holds.
+         call self%means%take(model, tuned, means, [sector_reduction ::], error)
+         if (allocated(error)) return
+         allocate (self%deviation)
+         call new_ring_deviation(model%cyclic%deviation, model%cyclic, relative, self%deviation)
+      else
+         call self%means%take(model, relative, means, self%basis, error)
+         if (allocated(error)) return
+      end if
       call self%ring%plan(self%n_slots, self%n_alike)
       call self%observed_ring%plan(size(model%observe_matrix, 1), self%n_alike)
    end procedure new_all_sectors

@@ -4,6 +4,7 @@
 !> to sector the factor z = exp(-2 pi i k/n_sectors).
 module fw_cyclic_data
    use, intrinsic :: iso_fortran_env, only: int64
+   use fw_deviation, only: deviation_type
    use fw_kinds, only: pi, wp
    use fw_load_waves, only: load_waves
    implicit none (type, external)
@@ -105,6 +106,8 @@ module fw_cyclic_data
       type(speed_matrices), allocatable :: speed
       !> Forces of the air; not allocated where there are none.
       type(influence_type), allocatable :: air
+      !> What sectors have beside each other; not allocated where they are alike.
+      type(deviation_type), allocatable :: deviation
    contains
       procedure :: nodal_diameter
       procedure :: factor

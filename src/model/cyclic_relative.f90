@@ -28,6 +28,7 @@ module fw_cyclic_relative
       procedure :: lay_out
       procedure :: lay_out_all
       procedure :: weights
+      procedure :: between
       procedure :: first_dependent
    end type cyclic_relative
 
@@ -40,20 +41,24 @@ module fw_cyclic_relative
 
 contains
 
-   subroutine new_cyclic_relative(model, side_1, side_2, sector_2, self)
+   subroutine new_cyclic_relative(model, side_1, side_2, sector_2, self, others)
       type(model_type), intent(in) :: model
       !> Signed dofs of the rows, 0 for the ground, and the sector of the second (n_rows).
       integer, intent(in) :: side_1(:), side_2(:), sector_2(:)
       type(cyclic_relative), intent(out) :: self
+      !> Rows of all dofs behind them (n_others, n_dof).
+      real(wp), intent(in), optional :: others(:, :)
       complex(wp), allocatable :: rows(:, :)
-      logical :: is_coordinate(size(side_1))
+      logical, allocatable :: is_coordinate(:)
       integer :: k, r, step
 
       self%n_rows = size(side_1)
+      if (present(others)) self%n_rows = self%n_rows + size(others, 1)
+      allocate (is_coordinate(self%n_rows))
       associate (n => model%cyclic%n_sectors)
          allocate (self%at(n/2 + 1))
          do k = 0, n/2
-            call sector_rows(model, k, side_1, side_2, sector_2, rows)
+            call sector_rows(model, k, side_1, side_2, sector_2, rows, others)
             call new_sector_relative(rows, self%at(k + 1))
          end do
          ! The wave has the multiples of gcd(N, EO), whatever its harmonics: numbers of coordinates
@@ -208,6 +213,22 @@ contains
       end subroutine append
 
    end subroutine spread_row
+
+   !> A row of a sector as a combination of coordinates: which of a sector, how many sectors behind,
+   !> and their weights.
+   subroutine between(self, cyclic, row, slot, behind, weight)
+      class(cyclic_relative), intent(in) :: self
+      type(cyclic_type), intent(in) :: cyclic
+      integer, intent(in) :: row
+      integer, allocatable, intent(out) :: slot(:), behind(:)
+      real(wp), allocatable, intent(out) :: weight(:)
+      type(ring_row) :: entries
+
+      call spread_row(self, cyclic, row, entries)
+      slot = entries%coordinate
+      behind = entries%behind
+      weight = entries%weight
+   end subroutine between
 
    !> Bring the entry of a coordinate to the front of its row.
    pure subroutine put_first(relative, turned, row, coordinate)

@@ -203,22 +203,32 @@ contains
    end subroutine damp_modes
 
    !> Rows (S_1 - z**sector_2 S_2) T of pairs and springs (n_rows, n).
-   pure subroutine sector_rows(model, k, side_1, side_2, sector_2, rows)
+   pure subroutine sector_rows(model, k, side_1, side_2, sector_2, rows, others)
       type(model_type), intent(in) :: model
       integer, intent(in) :: k
       !> Signed dofs, 0 for the ground, and the sector of the second (n_rows).
       integer, intent(in) :: side_1(:), side_2(:), sector_2(:)
       complex(wp), intent(out), allocatable :: rows(:, :)
+      !> Rows of all dofs behind them (n_others, n_dof).
+      real(wp), intent(in), optional :: others(:, :)
       complex(wp) :: turn(model%n_dof), z
-      integer :: place(model%n_dof), n, r
+      integer :: i, n, n_rows, place(model%n_dof), r
 
       call tie_sector(model, k, place, turn, n)
-      allocate (rows(size(side_1), n), source=(0.0_wp, 0.0_wp))
+      n_rows = size(side_1)
+      if (present(others)) n_rows = n_rows + size(others, 1)
+      allocate (rows(n_rows, n), source=(0.0_wp, 0.0_wp))
       do r = 1, size(side_1)
          z = model%cyclic%factor(k, sector_2(r))
          associate (row => rows(r, :))
             if (side_1(r) /= 0) call add_side(place, turn, side_1(r), (1.0_wp, 0.0_wp), row)
             if (side_2(r) /= 0) call add_side(place, turn, side_2(r), -z, row)
+         end associate
+      end do
+      if (.not. present(others)) return
+      do i = 1, model%n_dof
+         associate (column => rows(size(side_1) + 1:, place(i)))
+            column = column + turn(i)*others(:, i)
          end associate
       end do
    end subroutine sector_rows

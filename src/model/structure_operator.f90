@@ -95,6 +95,11 @@ module fw_structure_operator
       procedure :: wave_block
       procedure :: find_waves
       procedure :: add_waves
+      procedure :: n_own
+      procedure :: own_rows
+      procedure :: own_block
+      procedure :: read_own
+      procedure :: add_own
    end type structure_operator
 
    abstract interface
@@ -496,5 +501,61 @@ contains
       associate (unused => self)
       end associate
    end subroutine add_waves
+
+   ! What sectors have beside each other: matrices on rows of each, without their mean, which the
+   ! waves have. Structures whose sectors are alike have no such row, and nothing below is asked.
+
+   !> Rows of a sector.
+   pure integer function n_own(self)
+      class(structure_operator), intent(in) :: self
+
+      n_own = 0
+      associate (unused => self)
+      end associate
+   end function n_own
+
+   !> The rows in nodal diameter k = 0 .. n_alike - 1 (n_own, n_slots).
+   subroutine own_rows(self, k, rows)
+      class(structure_operator), intent(in) :: self
+      integer, intent(in) :: k
+      complex(wp), intent(out) :: rows(:, :)
+
+      rows = (0.0_wp, 0.0_wp)
+      associate (unused => self, neither => k)
+      end associate
+   end subroutine own_rows
+
+   !> The matrices of all sectors in the h-th harmonic (n_own, n_own, n_alike).
+   subroutine own_block(self, state, h, matrix)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out) :: matrix(:, :, :)
+
+      matrix = (0.0_wp, 0.0_wp)
+      associate (unused => self, unused_state => state, neither => h)
+      end associate
+   end subroutine own_block
+
+   !> The rows of all sectors (n_own, n_alike) from the coordinates of these (n_slots, n_alike).
+   subroutine read_own(self, sectors, rows)
+      class(structure_operator), intent(in) :: self
+      complex(wp), intent(in) :: sectors(:, :)
+      complex(wp), intent(out) :: rows(:, :)
+
+      rows = (0.0_wp, 0.0_wp)
+      associate (unused => self, neither => sectors)
+      end associate
+   end subroutine read_own
+
+   !> Forces on the rows, added to those on the coordinates.
+   subroutine add_own(self, rows, sectors)
+      class(structure_operator), intent(in) :: self
+      complex(wp), intent(in) :: rows(:, :)
+      complex(wp), intent(inout) :: sectors(:, :)
+
+      associate (unused => self, neither => rows, nor => sectors)
+      end associate
+   end subroutine add_own
 
 end module fw_structure_operator

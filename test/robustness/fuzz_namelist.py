@@ -15,6 +15,8 @@ KEYS = {
               "rayleigh_mass", "rayleigh_stiffness", "modal_damping", "modal_damping_up_to",
               "rotation_speed", "loss_factor"],
     "cyclic": ["n_sectors", "engine_order", "mistuned", "n_modes", "n_interface", "left", "right"],
+    "mistuning": ["n_rows", "rows", "row_omega", "frequency", "damping_ratio", "stiffness", "mass",
+                  "blade_stiffness", "blade_mass", "scale"],
     "contact": ["n_pairs", "law", "normal_law", "n_table", "overclosure", "force",
                 "normal_per_area", "side_1", "side_2", "sector_2", "mu", "gap", "area",
                 "normal_load", "gap_rotation", "normal_load_rotation", "tangential_stiffness",

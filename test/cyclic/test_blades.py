@@ -1,0 +1,160 @@
+"""Sectors that differ (&mistuning).
+
+test/reference/blades/b1.., b2.., b3.. and b8.. are annuli by a dense harmonic balance of other
+origin. Random disks are judged by the program itself on the annulus as one structure.
+"""
+import json
+
+import h5py
+import numpy as np
+import pytest
+from annulus import random_case
+from cases import read, run
+from cyclic_cases import difference
+from deviations import annulus, draw, write
+from project import ROOT
+from scipy.linalg import eigh
+
+FILES = ["b1_frequency", "b2_matrices", "b3_stiffness_mass", "b8_rigid"]
+REFERENCE = {name: json.loads((ROOT / f"test/reference/blades/{name}.json").read_text())
+             for name in FILES}
+RUNS = [(name, number) for name in FILES for number in range(len(REFERENCE[name]["runs"]))
+        if "sensitivity" not in REFERENCE[name]["runs"][number]["case"]]
+#: Both are solved to residuals of 1e-12; conditioning takes the rest.
+EQUAL = 1e-9
+#: Only round-off tells two ways to say the same.
+SAME = 1e-11
+
+
+def write_model(path, datasets):
+    with h5py.File(path, "w") as file:
+        file.attrs["format"], file.attrs["format_version"] = "fretwear-model", 1
+        for name, values in datasets.items():
+            group, _, attribute = name.partition("@")
+            if attribute:
+                file.require_group(group or "/").attrs[attribute] = values
+            else:
+                file[name] = np.array(values)
+
+
+def groups_of(case):
+    groups = {group: dict(keys) for group, keys in case.items()}
+    sweep = groups.get("sweep", {})
+    if "frequencies" in sweep:
+        sweep["values"] = sweep.pop("frequencies")
+    return groups | {"model": {"source": "hdf5", "file": "model.h5"} | groups.get("model", {})}
+
+
+@pytest.mark.parametrize(("name", "number"), RUNS)
+def test_other_programs(tmp_path, name, number):
+    write_model(tmp_path / "model.h5", REFERENCE[name]["file"])
+    wanted = REFERENCE[name]["runs"][number]
+    run(tmp_path, groups_of(wanted["case"]))
+    with h5py.File(tmp_path / "case.h5") as file:
+        for row in wanted["expect"]:
+            values = np.array(row["value"])
+            error = np.abs(file[row["dataset"]][()] - values).max() / np.abs(values).max()
+            assert error <= row["limit"], row["dataset"]
+
+
+def solve(folder, case, parts, omegas=(0.7, 1.3, 1.9), **more):
+    """Rows of all sectors of a case with parts of /mistuning."""
+    folder.mkdir()
+    write(folder / "model.h5", case, parts)
+    run(folder, {"case": {"analysis": "frf"}, "model": {"source": "hdf5", "file": "model.h5"},
+                 "cyclic": {"engine_order": case["engine_order"], "mistuned": True},
+                 "contact": {"law": case["law"]}, "sweep": {"values": list(omegas)},
+                 "solver": {"tolerance": 1e-12},
+                 "harmonics": {"n_harmonics": 3, "sampling": "uniform", "n_time": 80}} | more)
+    return read(folder / "case.h5")["coefficients"]
+
+
+def sector(seed=7, n_sectors=5):
+    rng = np.random.default_rng([59, seed])
+    case = random_case(rng, n_sectors=n_sectors, n_pairs=1, engine_order=2)
+    case["model"]["left"], case["model"]["right"] = [1], [2]
+    return rng, case
+
+
+def with_rows(rng, case, r=2):
+    n = len(case["model"]["mass"])
+    return {"rows": 0.5 * rng.normal(size=(r, n)), "row_omega": rng.uniform(0.8, 3.0, r),
+            "frequency": 0.05 * rng.uniform(-1.0, 1.0, (case["n_sectors"], r))}
+
+
+def test_deviations_of_nothing_change_no_bit(tmp_path):
+    rng, case = sector()
+    parts = with_rows(rng, case)
+    plain = solve(tmp_path / "plain", case, {})
+    parts["frequency"] *= 0.0
+    assert np.array_equal(solve(tmp_path / "zero", case, parts), plain)
+
+
+def test_rows_and_matrices_say_the_same(tmp_path):
+    """Rows; the stiffness of a blade with one row; matrices of sectors, added or whole."""
+    rng, case = sector()
+    parts = with_rows(rng, case, 1)
+    w, d, rows = parts["row_omega"], parts["frequency"], parts["rows"]
+    found = solve(tmp_path / "rows", case, parts)
+    blade = rows.T @ np.diag(w**2) @ rows
+    part = (1.0 + d[:, 0])**2 - 1.0
+    ways = {"blade": {"blade_stiffness": blade, "stiffness": part},
+            "sectors": {f"sector/{j}/stiffness": e * blade for j, e in enumerate(part)}}
+    ways["whole"] = {name: value + np.array(case["model"]["stiffness"])
+                     for name, value in ways["sectors"].items()}
+    ways["whole"] |= {f"sector/{j}@kind": "full" for j in range(len(part))}
+    for way, parts_of in ways.items():
+        assert difference(solve(tmp_path / way, case, parts_of), found) < EQUAL, way
+
+
+def test_a_turned_pattern_turns_the_answer(tmp_path):
+    rng, case = sector()
+    parts = with_rows(rng, case)
+    found = solve(tmp_path / "one", case, parts)
+    parts["frequency"] = np.roll(parts["frequency"], 1, axis=0)
+    turned = solve(tmp_path / "two", case, parts)
+    n = case["n_sectors"]
+    amplitude = found[:, 1::2] - 1j * found[:, 2::2]
+    phase = np.exp(-2j * np.pi * case["engine_order"] / n * np.arange(1, 4))[None, :, None]
+    wanted = np.roll(amplitude.reshape(3, 3, n, -1), 1, axis=2).reshape(amplitude.shape) * phase
+    assert difference(turned[:, 1::2] - 1j * turned[:, 2::2], wanted) < EQUAL
+
+
+def test_many_modes_are_those_of_the_annulus(tmp_path):
+    """More unknowns than are solved for at once."""
+    rng, case = sector(n_sectors=70)
+    parts, scale, change = draw(rng, case, "rows", 0.05)
+    write(tmp_path / "model.h5", case, parts)
+    run(tmp_path, {"case": {"analysis": "modes"}, "mistuning": {"scale": scale},
+                   "model": {"source": "hdf5", "file": "model.h5"},
+                   "cyclic": {"mistuned": True, "n_modes": 2}})
+    result = read(tmp_path / "case.h5")
+    whole = annulus(case, change).case["model"]
+    assert len(whole["mass"]) > 500
+    theta = eigh(np.array(whole["mass"]), np.array(whole["stiffness"]), eigvals_only=True)[::-1]
+    wanted = 1.0 / np.sqrt(theta[:140])
+    assert np.abs(result["modes/open"][0] / wanted - 1.0).max() < EQUAL
+    assert np.abs(result["modes/closed_content"].sum(axis=1) - 1.0).max() < SAME
+
+
+@pytest.mark.parametrize(("groups", "told"), [
+    ({"cyclic": {"engine_order": 2}}, "mistuned = .false., but the sectors differ"),
+    ({"mistuning": {"frequency": [0.1, 0.2]}}, "must be 5, one for each sector, or 10"),
+    ({"mistuning": {"stiffness": [0.1] * 5}}, "is given without blade_stiffness"),
+    ({"mistuning": {"mass": [0.1] * 4}}, "must be 5, one for each sector"),
+    ({"mistuning": {"frequency": [-1.5] + [0.0] * 4}}, "of sector 0, times scale"),
+    ({"mistuning": {"mass": [0.0] * 4 + [-99.0], "blade_mass": []}},
+     "of sector 4 makes its mass matrix"),
+    ({"mistuning": {"n_rows": 3}}, "give rows and row_omega of as many")])
+def test_wrong_deviations_are_refused(tmp_path, groups, told):
+    rng, case = sector()
+    write(tmp_path / "model.h5", case, with_rows(rng, case))
+    for keys in groups.values():
+        if "blade_mass" in keys:
+            keys["blade_mass"] = np.eye(len(case["model"]["mass"])).tolist()
+    done = run(tmp_path, {"case": {"analysis": "frf"},
+                          "model": {"source": "hdf5", "file": "model.h5"},
+                          "cyclic": {"engine_order": 2, "mistuned": True},
+                          "contact": {"law": "penalty"}, "sweep": {"values": [0.7]},
+                          "harmonics": {"n_harmonics": 1}} | groups, status=3)
+    assert told in done.stderr
