@@ -13,9 +13,9 @@ from typing import Literal, TypedDict
 from numpy.typing import ArrayLike
 
 __all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic", "Damper",
-           "Groups", "Harmonics", "Load", "Mission", "Mode", "Output", "Polynomial", "PseudoTime",
-           "Resonance", "Sensitivity", "Solver", "Spring", "Stress", "Structure", "Sweep", "Time",
-           "Wear"]
+           "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output", "Polynomial",
+           "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Stress", "Structure",
+           "Sweep", "Time", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -32,6 +32,10 @@ UNITS: dict[str, str] = {
     "model%rayleigh_stiffness": "s",
     "model%modal_damping_up_to": "Hz",
     "model%rotation_speed": "rad/s",
+    "mistuning%rows": "M^0.5",
+    "mistuning%row_omega": "rad/s",
+    "mistuning%blade_stiffness": "F/L",
+    "mistuning%blade_mass": "M",
     "contact%overclosure": "L",
     "contact%force": "F",
     "contact%gap": "L",
@@ -207,6 +211,34 @@ class Cyclic(TypedDict, total=False):
     #: the same of the right one, which moves as the left one of the next sector; negative: with its
     #: sign turned (default: of the file)
     right: ArrayLike
+
+
+class Mistuning(TypedDict, total=False):
+    """Group &mistuning: how sectors differ from the tuned one."""
+
+    #: blade modes whose frequencies differ (default: of the file, else 0)
+    n_rows: int
+    #: [M^0.5] their rows, one after another: W of the guide (default: of the file, else none)
+    rows: ArrayLike
+    #: [rad/s] their frequencies, blade alone (default: of the file, else none)
+    row_omega: ArrayLike
+    #: by which part the frequencies of each blade are above the tuned ones: n_sectors values, or
+    #: all rows of each sector; only: cyclic%mistuned = .true. (default: of the file, else none)
+    frequency: ArrayLike
+    #: damping ratios of each blade above the tuned ones, likewise; only: cyclic%mistuned = .true.
+    #: (default: of the file, else none)
+    damping_ratio: ArrayLike
+    #: by which part the stiffness of each blade is above the tuned one: n_sectors values; only:
+    #: cyclic%mistuned = .true. (default: of the file, else none)
+    stiffness: ArrayLike
+    #: the same of its mass; only: cyclic%mistuned = .true. (default: of the file, else none)
+    mass: ArrayLike
+    #: [F/L] stiffness of the blade alone, symmetric (default: of the file, else none)
+    blade_stiffness: ArrayLike
+    #: [M] mass of the blade alone, symmetric (default: of the file, else none)
+    blade_mass: ArrayLike
+    #: multiplies all deviations; only: cyclic%mistuned = .true. (default: 1)
+    scale: float
 
 
 class Contact(TypedDict, total=False):
@@ -723,6 +755,7 @@ class Groups(TypedDict, total=False):
     resonance: Resonance
     structure: Structure
     cyclic: Cyclic
+    mistuning: Mistuning
     contact: Contact
     spring: Spring
     polynomial: Polynomial
