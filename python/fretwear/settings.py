@@ -86,7 +86,7 @@ class CaseGroup(TypedDict, total=False):
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
     #: a sweep, one frequency, wear at one frequency, integration in time, natural frequencies, a
-    #: nonlinear mode, a resonance over a parameter, or frequencies over the (default: 'frf')
+    #: nonlinear mode, a resonance, or a Campbell diagram (default: 'frf')
     analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int

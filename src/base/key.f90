@@ -219,6 +219,10 @@ contains
       call self%bind(key, flat, needed, default)
       if (.not. allocated(flat)) return
       extents = self%extents(key%shape)
+      if (allocated(values)) then
+         ! A visitor that reads one key at a time has no extents of the others.
+         if (size(values) == size(flat) .and. product(extents) /= size(flat)) extents = shape(values)
+      end if
       values = reshape(flat, extents)
    end subroutine bind_matrix
 
@@ -235,6 +239,10 @@ contains
       call self%bind(key, flat, needed, default)
       if (.not. allocated(flat)) return
       extents = self%extents(key%shape)
+      if (allocated(values)) then
+         ! A visitor that reads one key at a time has no extents of the others.
+         if (size(values) == size(flat) .and. product(extents) /= size(flat)) extents = shape(values)
+      end if
       values = reshape(flat, extents)
    end subroutine bind_integer_matrix
 

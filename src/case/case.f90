@@ -144,8 +144,7 @@ contains
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
                               'integration in time, natural frequencies, a nonlinear '// &
-                              'mode, a resonance over a parameter, or frequencies over '// &
-                              'the rotation speed'), &
+                              'mode, a resonance, or a Campbell diagram'), &
                           self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)

@@ -5,16 +5,23 @@ module fw_campbell_search
    implicit none (type, external)
    private
 
-   public :: find_root, find_largest
+   public :: function_of_one, find_root, find_largest
+
+   !> An object in place of a procedure within another, which would need an executable stack.
+   type, abstract :: function_of_one
+   contains
+      procedure(value_at), deferred :: at
+   end type function_of_one
 
    abstract interface
-      subroutine function_of_one(x, value, failure)
-         import :: error_type, wp
+      subroutine value_at(self, x, value, error)
+         import :: error_type, function_of_one, wp
          implicit none (type, external)
+         class(function_of_one), intent(inout) :: self
          real(wp), intent(in) :: x
          real(wp), intent(out) :: value
-         type(error_type), allocatable, intent(out) :: failure
-      end subroutine function_of_one
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine value_at
    end interface
 
    !> Roots are found to this part of themselves, maxima to the root of the round-off of the height.
@@ -26,7 +33,7 @@ contains
 
    !> By the Illinois variant of regula falsi, and by halves where it is slow.
    subroutine find_root(f, ends, values, root, error)
-      procedure(function_of_one) :: f
+      class(function_of_one), intent(inout) :: f
       !> Of an interval, with values of opposite signs.
       real(wp), intent(in) :: ends(2), values(2)
       real(wp), intent(out) :: root
@@ -43,7 +50,7 @@ contains
       do i = 1, most_steps
          root = b - fb*(b - a)/(fb - fa)
          if (mod(i, 4) == 0) root = 0.5_wp*(a + b)
-         call f(root, value, error)
+         call f%at(root, value, error)
          if (allocated(error)) return
          if (.not. abs(value) > 0.0_wp) return
          if (value*fb < 0.0_wp) then
@@ -62,7 +69,7 @@ contains
    !> By Brent's parabolas and golden sections: Algorithms for Minimization without Derivatives,
    !> 1973, chapter 5.
    subroutine find_largest(f, ends, height, place, error)
-      procedure(function_of_one) :: f
+      class(function_of_one), intent(inout) :: f
       !> Of an interval, and a place inside that is higher than both.
       real(wp), intent(in) :: ends(3), height
       real(wp), intent(out) :: place
@@ -106,7 +113,7 @@ contains
             d = golden*e
          end if
          u = x + merge(d, sign(tolerance, d), abs(d) >= tolerance)
-         call f(u, fu, error)
+         call f%at(u, fu, error)
          if (allocated(error)) exit
          fu = -fu
          if (fu <= fx) then

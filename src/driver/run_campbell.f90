@@ -9,7 +9,7 @@ module fw_run_campbell
    use fw_analysis, only: analysis, run_type
    use fw_body, only: body_type
    use fw_campbell_group, only: campbell_group
-   use fw_campbell_search, only: find_largest, find_root
+   use fw_campbell_search, only: find_largest, find_root, function_of_one
    use fw_case, only: case_type
    use fw_changed_case, only: read_changed
    use fw_error, only: error_type, status_stopped
@@ -17,6 +17,7 @@ module fw_run_campbell
    use fw_kinds, only: wp
    use fw_modes, only: mode_type
    use fw_natural_modes, only: find_natural_modes, natural_modes
+   use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_sector_modes, only: find_sector_modes
    use fw_strategy, only: new_request, point_strategy
@@ -42,6 +43,27 @@ module fw_run_campbell
       integer :: order = 0, nodal_diameter = 0
       class(case_type), allocatable :: case
    end type line_type
+
+   !> How far a mode of the nodal diameter of an order lies above the order, over the speed.
+   type, extends(function_of_one) :: distance_type
+      type(line_type), pointer :: line => null()
+      integer :: mode = 0
+      logical :: closed = .false.
+   contains
+      procedure :: at => distance_at
+   end type distance_type
+
+   !> The first harmonic along an order, over the frequency: below 0 where it could not be solved.
+   type, extends(function_of_one) :: height_type
+      type(line_type), pointer :: line => null()
+      class(point_strategy), pointer :: strategy => null()
+      class(observer_type), pointer :: observer => null()
+      !> Of all observed quantities, at the last frequency.
+      real(wp), allocatable :: amplitude(:)
+      integer :: n_failed = 0, n_solved = 0
+   contains
+      procedure :: at => height_at
+   end type height_type
 
    type, extends(analysis) :: campbell_analysis
       type(line_type), allocatable, private :: line(:)
@@ -231,12 +253,13 @@ contains
 
    !> Where a mode of the nodal diameter of an order has its frequency.
    subroutine find_roots(line, mode, group, closed, speeds, error)
-      type(line_type), intent(in) :: line
+      type(line_type), intent(in), target :: line
       integer, intent(in) :: mode
       type(campbell_group), intent(in) :: group
       logical, intent(in) :: closed
       real(wp), allocatable, intent(out) :: speeds(:)
       type(error_type), allocatable, intent(out) :: error
+      type(distance_type) :: distance
       real(wp), allocatable :: difference(:)
       real(wp) :: speed, value
       integer :: i, place
@@ -250,42 +273,44 @@ contains
       else
          difference = group%open(mode, place, :) - abs(line%order)*group%speed
       end if
+      distance%line => line
+      distance%mode = mode
+      distance%closed = closed
       do i = 1, size(difference) - 1
          if (ieee_is_nan(difference(i)) .or. ieee_is_nan(difference(i + 1))) cycle
          if (.not. difference(i)*difference(i + 1) <= 0.0_wp) cycle
          ! On the last speed of an interval: it is on the first of the next, if there is one.
          if (.not. abs(difference(i + 1)) > 0.0_wp .and. i < size(difference) - 1) cycle
-         call find_root(difference_at, group%speed(i:i + 1), difference(i:i + 1), speed, error)
-         if (.not. allocated(error)) call difference_at(speed, value, error)
+         call find_root(distance, group%speed(i:i + 1), difference(i:i + 1), speed, error)
+         if (.not. allocated(error)) call distance%at(speed, value, error)
          if (allocated(error)) return
          ! Where a mode comes or goes those above it change their numbers, and meet nothing.
          if (abs(value) <= near*abs(line%order)*speed) speeds = [speeds, speed]
       end do
-
-   contains
-
-      subroutine difference_at(x, value, failure)
-         real(wp), intent(in) :: x
-         real(wp), intent(out) :: value
-         type(error_type), allocatable, intent(out) :: failure
-         type(natural_modes) :: modes
-         type(body_type) :: body
-         integer :: k
-
-         value = 0.0_wp
-         call turn(line, x, body)
-         k = line%nodal_diameter
-         if (.not. body%model%cyclic%splits_waves()) k = abs(k)
-         call find_natural_modes(body, mode, modes, failure, [k])
-         if (allocated(failure)) return
-         if (closed) then
-            value = modes%closed(mode, 1) - abs(line%order)*x
-         else
-            value = modes%open(mode, 1) - abs(line%order)*x
-         end if
-      end subroutine difference_at
-
    end subroutine find_roots
+
+   subroutine distance_at(self, x, value, error)
+      class(distance_type), intent(inout) :: self
+      real(wp), intent(in) :: x
+      real(wp), intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      type(natural_modes) :: modes
+      type(body_type) :: body
+      integer :: k
+
+      value = 0.0_wp
+      call turn(self%line, x, body)
+      k = self%line%nodal_diameter
+      if (.not. body%model%cyclic%splits_waves()) k = abs(k)
+      call find_natural_modes(body, self%mode, modes, error, [k])
+      if (allocated(error)) return
+      value = -abs(self%line%order)*x
+      if (self%closed) then
+         value = value + modes%closed(self%mode, 1)
+      else
+         value = value + modes%open(self%mode, 1)
+      end if
+   end subroutine distance_at
 
    !> Of the mode with its pairs closed.
    subroutine find_damping(line, crossing)
@@ -327,6 +352,7 @@ contains
       type(campbell_group), intent(inout) :: group
       type(error_type), allocatable, intent(out) :: error
       class(point_strategy), allocatable, target :: strategy
+      type(height_type) :: height
       integer :: i, line
 
       associate (n => size(self%crossing))
@@ -344,9 +370,13 @@ contains
                call new_strategy(self%line(line)%case, strategy)
                call strategy%start(self%line(line)%case, error)
                if (allocated(error)) return
+               height%line => self%line(line)
+               height%strategy => strategy
+               height%observer => run%observer
             end if
-            call find_peak(self, c, run, strategy, group%peak_omega(i), &
-                           group%peak_amplitude(:, i), error)
+            call find_peak(c, height, group%peak_omega(i), group%peak_amplitude(:, i), error)
+            self%n_solved = height%n_solved
+            self%n_failed = height%n_failed
             group%peak_speed(i) = group%peak_omega(i)/abs(self%line(line)%order)
             if (allocated(error)) return
          end associate
@@ -354,65 +384,56 @@ contains
    end subroutine find_peaks
 
    !> Frequencies across the window, and between the neighbours of the highest one its maximum.
-   subroutine find_peak(self, crossing, run, strategy, omega, amplitude, error)
-      class(campbell_analysis), intent(inout), target :: self
+   subroutine find_peak(crossing, height, omega, amplitude, error)
       type(crossing_type), intent(in) :: crossing
-      type(run_type), intent(inout), target :: run
-      class(point_strategy), intent(inout), target :: strategy
+      type(height_type), intent(inout) :: height
       !> NaN where there is no maximum inside.
       real(wp), intent(inout) :: omega, amplitude(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: at(:), height(:), trial(:)
-      real(wp) :: window(2), width
+      real(wp), allocatable :: at(:), found(:)
+      real(wp) :: window(2), width, top
       integer :: i, k, n
 
-      associate (line => self%line(crossing%line))
-         if (size(amplitude) == 0) return
-         n = line%case%sweep%n_points
-         window = abs(line%order)*[min(crossing%speed, crossing%open_speed), &
-                                   max(crossing%speed, crossing%open_speed)]
-         width = max(merge(0.0_wp, crossing%damping_ratio, ieee_is_nan(crossing%damping_ratio)), &
-                     least_ratio)*abs(line%order)*crossing%speed
-         window = window + half_widths*width*[-1.0_wp, 1.0_wp]
-         window(1) = max(window(1), near*window(2))
-         at = window(1) + (window(2) - window(1))*[(real(i, wp)/(n - 1), i=0, n - 1)]
-         allocate (height(n), trial(size(amplitude)))
-         do i = 1, n
-            call height_at(at(i), height(i), error)
-            if (allocated(error)) return
-         end do
-         k = maxloc(height, dim=1)
-         if (k == 1 .or. k == n .or. .not. height(k) > 0.0_wp) return
-         call find_largest(height_at, at(k - 1:k + 1), height(k), omega, error)
+      if (size(amplitude) == 0) return
+      n = height%line%case%sweep%n_points
+      window = abs(height%line%order)*[min(crossing%speed, crossing%open_speed), &
+                                       max(crossing%speed, crossing%open_speed)]
+      width = max(merge(0.0_wp, crossing%damping_ratio, ieee_is_nan(crossing%damping_ratio)), &
+                  least_ratio)*abs(height%line%order)*crossing%speed
+      window = window + half_widths*width*[-1.0_wp, 1.0_wp]
+      window(1) = max(window(1), near*window(2))
+      at = window(1) + (window(2) - window(1))*[(real(i, wp)/(n - 1), i=0, n - 1)]
+      allocate (found(n))
+      do i = 1, n
+         call height%at(at(i), found(i), error)
          if (allocated(error)) return
-         call height_at(omega, width, error)
-         if (.not. allocated(error)) amplitude = trial
-      end associate
-
-   contains
-
-      !> Below 0 where it could not be solved.
-      subroutine height_at(x, value, failure)
-         real(wp), intent(in) :: x
-         real(wp), intent(out) :: value
-         type(error_type), allocatable, intent(out) :: failure
-         type(point_type) :: point
-
-         value = -1.0_wp
-         associate (case => self%line(crossing%line)%case)
-            call strategy%solve_in_time(case, new_request(case, x, run%observer), point, failure)
-         end associate
-         if (allocated(failure)) return
-         self%n_solved = self%n_solved + 1
-         if (.not. point%converged) then
-            self%n_failed = self%n_failed + 1
-            return
-         end if
-         trial = norm2(point%coefficients(2:3, :), dim=1)
-         value = trial(1)
-      end subroutine height_at
-
+      end do
+      k = maxloc(found, dim=1)
+      if (k == 1 .or. k == n .or. .not. found(k) > 0.0_wp) return
+      call find_largest(height, at(k - 1:k + 1), found(k), omega, error)
+      if (.not. allocated(error)) call height%at(omega, top, error)
+      if (.not. allocated(error)) amplitude = height%amplitude
    end subroutine find_peak
+
+   subroutine height_at(self, x, value, error)
+      class(height_type), intent(inout) :: self
+      real(wp), intent(in) :: x
+      real(wp), intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: point
+
+      value = -1.0_wp
+      call self%strategy%solve_in_time(self%line%case, new_request(self%line%case, x, &
+                                                                   self%observer), point, error)
+      if (allocated(error)) return
+      self%n_solved = self%n_solved + 1
+      if (.not. point%converged) then
+         self%n_failed = self%n_failed + 1
+         return
+      end if
+      self%amplitude = norm2(point%coefficients(2:3, :), dim=1)
+      value = self%amplitude(1)
+   end subroutine height_at
 
    !> A line for each crossing.
    subroutine make_table(self, group, table)
