@@ -221,7 +221,9 @@ contains
       extents = self%extents(key%shape)
       if (allocated(values)) then
          ! A visitor that reads one key at a time has no extents of the others.
-         if (size(values) == size(flat) .and. product(extents) /= size(flat)) extents = shape(values)
+         if (size(values) == size(flat) .and. product(extents) /= size(flat)) then
+            extents = shape(values)
+         end if
       end if
       values = reshape(flat, extents)
    end subroutine bind_matrix
@@ -241,7 +243,9 @@ contains
       extents = self%extents(key%shape)
       if (allocated(values)) then
          ! A visitor that reads one key at a time has no extents of the others.
-         if (size(values) == size(flat) .and. product(extents) /= size(flat)) extents = shape(values)
+         if (size(values) == size(flat) .and. product(extents) /= size(flat)) then
+            extents = shape(values)
+         end if
       end if
       values = reshape(flat, extents)
    end subroutine bind_integer_matrix

@@ -35,7 +35,7 @@ module fw_part
       integer :: storage = by_rows
    end type part_type
 
-   character(*), parameter :: scalar = 'one_or '
+   character(*), parameter, public :: scalar = 'one_or '
 
    !> Words of shapes that stand for extents which parts share, at most.
    integer, parameter :: most_words = 32

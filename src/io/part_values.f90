@@ -4,7 +4,7 @@
 module fw_part_values
    use fw_error, only: fatal_error, status_input
    use fw_kinds, only: i8, wp
-   use fw_part, only: part_source, part_type
+   use fw_part, only: part_source, part_type, scalar
    use fw_parts, only: is_of_kind, put_name
    use fw_text, only: to_text
    use fw_values, only: read_integer
@@ -68,6 +68,7 @@ contains
          ! As many as there are, which parts that are given later may have to fit.
          n = int(self%n_values/known)
          self%dims(last) = n
+         call self%set_extent(first_word(part%shape), n)
          if (part%shape == 'quantity order') then
             call self%expect(known, self%n_values == known*n, 'a multiple of ', &
                              ', a row for each observed quantity')
@@ -84,6 +85,16 @@ contains
                           merge(' n**2', ' a**2', index(part%shape, 'order') > 0)//of_square)
       end select
    end subroutine find_extents
+
+   !> What the extent of a shape that varies slowest counts.
+   pure function first_word(shape) result(word)
+      character(*), intent(in) :: shape
+      character(len(shape)) :: word
+
+      word = shape
+      if (index(word, scalar) == 1) word = word(len(scalar) + 1:)
+      word = word(:index(word//' ', ' ') - 1)
+   end function first_word
 
    !> Refuse another number of values.
    subroutine expect(self, expected, is_met, before, behind)
