@@ -66,6 +66,7 @@ contains
          ' ('//trim(phrase)//')'
    end function feature_text
 
+   !> Whoever of those below knows the phrase answers.
    subroutine look_up(case, phrase, asked, known)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase
@@ -79,6 +80,7 @@ contains
       if (.not. known) call of_load(case, phrase, asked, known)
    end subroutine look_up
 
+   !> The analysis, the structure, and what goes with one analysis alone.
    subroutine of_analysis(case, phrase, asked, known)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase
@@ -137,6 +139,7 @@ contains
       end select
    end subroutine of_analysis
 
+   !> Harmonics, solver, output.
    subroutine of_method(case, phrase, asked, known)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase
@@ -168,6 +171,7 @@ contains
       end select
    end subroutine of_method
 
+   !> The path of the points.
    subroutine of_sweep(case, phrase, asked, known)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase
@@ -207,6 +211,7 @@ contains
       end associate
    end subroutine of_sweep
 
+   !> Pairs and their law, springs, other elements, the base.
    subroutine of_joint(case, phrase, asked, known)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase
@@ -251,6 +256,7 @@ contains
       end select
    end subroutine of_joint
 
+   !> Whether a pair slides in two directions.
    pure logical function has_two_tangents(case)
       type(case_type), intent(in) :: case
 
@@ -261,6 +267,7 @@ contains
       end associate
    end function has_two_tangents
 
+   !> Wear and missions.
    subroutine of_wear(case, phrase, asked, known)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase

@@ -180,6 +180,7 @@ contains
       if (k > 0) n = self%extent(k)
    end function extent_of
 
+   !> From now on a word of shapes stands for this extent.
    subroutine set_extent(self, word, n)
       class(part_source), intent(inout) :: self
       character(*), intent(in) :: word
@@ -207,6 +208,7 @@ contains
       has = has .and. .not. allocated(self%error)
    end function has
 
+   !> A word or a name.
    subroutine bind_text(self, part, value)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part
@@ -215,6 +217,7 @@ contains
       if (has(self, part, 'text')) value = self%texts(1)%text
    end subroutine bind_text
 
+   !> A list of them.
    subroutine bind_texts(self, part, values)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part
@@ -223,6 +226,7 @@ contains
       if (has(self, part, 'text')) values = self%texts
    end subroutine bind_texts
 
+   !> One whole number.
    subroutine bind_integer(self, part, value)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part
@@ -231,6 +235,7 @@ contains
       if (has(self, part, 'integer')) value = self%integers(1)
    end subroutine bind_integer
 
+   !> Whole numbers, flat in the order of Fortran.
    subroutine bind_integers(self, part, values)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part
@@ -248,6 +253,7 @@ contains
       if (has(self, part, 'integer')) values = reshape(self%integers, [self%dims(1), self%dims(2)])
    end subroutine bind_integer_matrix
 
+   !> Numbers, flat in the order of Fortran.
    subroutine bind_reals(self, part, values)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part
@@ -256,6 +262,7 @@ contains
       if (has(self, part, 'real')) values = self%reals
    end subroutine bind_reals
 
+   !> Two extents.
    subroutine bind_matrix(self, part, values)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part
@@ -291,6 +298,7 @@ contains
                                                                     self%dims(3)])
    end subroutine bind_tensor
 
+   !> Real and imaginary part innermost.
    subroutine bind_complex(self, part, values)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part
@@ -299,6 +307,7 @@ contains
       if (has(self, part, 'complex')) values = complex_of(self)
    end subroutine bind_complex
 
+   !> The same of two extents.
    subroutine bind_complex_matrix(self, part, values)
       class(part_source), intent(inout) :: self
       type(part_type), intent(in) :: part

@@ -103,6 +103,7 @@ contains
       call note_mesh(to)
    end subroutine bind_parts
 
+   !> Format, title and units, then the matrices.
    subroutine bind_structure(self, to)
       class(raw_model), intent(inout) :: self
       class(part_source), intent(inout) :: to
@@ -138,6 +139,7 @@ contains
                         'there, relative'), self%reduction_error)
    end subroutine bind_structure
 
+   !> Contact pairs and the constants of all laws.
    subroutine bind_pairs(pairs, to)
       type(contact_type), intent(inout) :: pairs
       class(part_source), intent(inout) :: to
@@ -230,6 +232,7 @@ contains
       pairs%table_force = table(:, 2)
    end subroutine bind_normal_laws
 
+   !> Nonlinear springs.
    subroutine bind_springs(springs, to)
       type(spring_type), intent(inout) :: springs
       class(part_source), intent(inout) :: to
@@ -260,6 +263,7 @@ contains
       end do
    end subroutine bind_elements
 
+   !> Static and vibratory loads, and tables of them.
    subroutine bind_loads(self, to)
       class(raw_model), intent(inout) :: self
       class(part_source), intent(inout) :: to
@@ -295,6 +299,7 @@ contains
                         storage=by_columns), self%harmonic_sine)
    end subroutine bind_loads
 
+   !> Names and rows of observed quantities.
    subroutine bind_observed(self, to)
       class(raw_model), intent(inout) :: self
       class(part_source), intent(inout) :: to

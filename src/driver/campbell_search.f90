@@ -33,9 +33,11 @@ contains
 
    !> By the Illinois variant of regula falsi, and by halves where it is slow.
    subroutine find_root(f, ends, values, root, error)
+      !> Evaluated a few times; a failure ends the search.
       class(function_of_one), intent(inout) :: f
       !> Of an interval, with values of opposite signs.
       real(wp), intent(in) :: ends(2), values(2)
+      !> Between the ends.
       real(wp), intent(out) :: root
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: a, b, fa, fb, value
@@ -69,9 +71,11 @@ contains
    !> By Brent's parabolas and golden sections: Algorithms for Minimization without Derivatives,
    !> 1973, chapter 5.
    subroutine find_largest(f, ends, height, place, error)
+      !> Evaluated some ten times.
       class(function_of_one), intent(inout) :: f
       !> Of an interval, and a place inside that is higher than both.
       real(wp), intent(in) :: ends(3), height
+      !> Of the largest value that was seen.
       real(wp), intent(out) :: place
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: a, b, d, e, fu, fv, fw, fx, m, p, q, r, tolerance, u, v, w, x

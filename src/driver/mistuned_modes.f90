@@ -83,6 +83,7 @@ contains
    !> Rows of the pairs of a sector, and their stiffness in all of them.
    subroutine list_pairs(case, rows)
       class(body_type), intent(in) :: case
+      !> Of one sector, held or with their stiffness in each.
       type(closed_rows), intent(out) :: rows
       class(pair_law), allocatable :: law
       integer :: c, i, j, n, n_pairs
@@ -116,7 +117,9 @@ contains
    !> Waves of all nodal diameters, and what sectors have beside each other.
    subroutine put_together(case, rows, pencil, error)
       class(body_type), intent(in) :: case
+      !> Of the pairs that are closed.
       type(closed_rows), intent(in) :: rows
+      !> Ready to be solved.
       type(ring_pencil), intent(out) :: pencil
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices) :: nodal

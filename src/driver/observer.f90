@@ -67,6 +67,7 @@ module fw_observer
 
 contains
 
+   !> Before the first point.
    subroutine on_start(self, case_title, n_points)
       class(silent_observer), intent(inout) :: self
       character(*), intent(in) :: case_title
@@ -76,6 +77,7 @@ contains
       end associate
    end subroutine on_start
 
+   !> Behind each point, once it is written.
    subroutine on_point(self, index, n_points, point)
       class(silent_observer), intent(inout) :: self
       integer, intent(in) :: index, n_points
@@ -86,6 +88,7 @@ contains
       end associate
    end subroutine on_point
 
+   !> What is worth telling while a run is at work.
    subroutine on_message(self, text)
       class(silent_observer), intent(inout) :: self
       character(*), intent(in) :: text
@@ -94,6 +97,7 @@ contains
       end associate
    end subroutine on_message
 
+   !> Behind the last point, whatever ended the run.
    subroutine on_end(self)
       class(silent_observer), intent(inout) :: self
 

@@ -62,7 +62,9 @@ contains
    !> has of the tuned inertia of each mode (N/2 + 1, modes).
    subroutine solve(self, cyclic, frequency, content, error)
       class(ring_pencil), intent(inout) :: self
+      !> How sectors stand around, and how they differ.
       type(cyclic_type), intent(in) :: cyclic
+      !> Ascending [rad/s] (n_modes), and shares of nodal diameters, 1 in all (0:N/2, n_modes).
       real(wp), intent(out) :: frequency(:), content(0:, :)
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: theta(:)
@@ -130,6 +132,7 @@ contains
 
    !> Factor a matrix that is positive definite by more than round-off.
    logical function is_held(matrix)
+      !> Its Cholesky factor on return.
       complex(wp), intent(inout) :: matrix(:, :)
       real(wp) :: least, diagonal(size(matrix, 1))
       integer :: i
@@ -179,6 +182,7 @@ contains
    !> The rows of all sectors of vectors in columns (r n_sectors, columns).
    function read_rows(self, x) result(y)
       class(ring_pencil), intent(in) :: self
+      !> Coordinates of all waves, in columns.
       complex(wp), intent(in) :: x(:, :)
       complex(wp), allocatable :: y(:, :), of_wave(:, :)
       integer :: j, k, n, r
@@ -198,7 +202,9 @@ contains
    !> Add what forces on the rows of sectors are to the waves: the adjoint.
    subroutine add_rows(self, f, x)
       class(ring_pencil), intent(in) :: self
+      !> On the rows of all sectors, in columns.
       complex(wp), intent(in) :: f(:, :)
+      !> Coordinates of all waves, in columns.
       complex(wp), intent(inout) :: x(:, :)
       complex(wp) :: of_wave(size(self%stiffness, 1), size(f, 2))
       integer :: j, k, n, r
@@ -219,6 +225,7 @@ contains
    !> (K + s M) x or M x of the whole.
    subroutine multiply(self, of_mass, x, product)
       class(ring_pencil), intent(in) :: self
+      !> Of the mass, not of the stiffness.
       logical, intent(in) :: of_mass
       complex(wp), intent(in), contiguous :: x(:, :)
       complex(wp), intent(out), contiguous :: product(:, :)
@@ -290,7 +297,9 @@ contains
    !> All modes at once, from the highest 1/(w^2 + s) down.
    subroutine solve_dense(self, theta, vectors, error)
       class(ring_pencil), intent(in) :: self
+      !> 1/(w**2 + s), from the highest down.
       real(wp), allocatable, intent(out) :: theta(:)
+      !> In columns.
       complex(wp), allocatable, intent(out) :: vectors(:, :)
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: unit(:, :)
@@ -350,8 +359,11 @@ contains
    !> The lowest n modes, from those of the waves.
    subroutine iterate(self, n, theta, vectors, error)
       class(ring_pencil), intent(in) :: self
+      !> Modes that are wanted.
       integer, intent(in) :: n
+      !> 1/(w**2 + s), from the highest down, of the whole space.
       real(wp), allocatable, intent(out) :: theta(:)
+      !> In columns, the wanted ones first.
       complex(wp), allocatable, intent(out) :: vectors(:, :)
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: space(:, :), product(:, :), whole(:, :)
@@ -385,6 +397,7 @@ contains
    !> Modes of the waves, as many of each as it takes to have m of all.
    subroutine tuned_space(self, m, space)
       class(ring_pencil), intent(in) :: self
+      !> Vectors at least.
       integer, intent(in) :: m
       complex(wp), allocatable, intent(out) :: space(:, :)
       real(wp), allocatable :: theta(:)
@@ -414,6 +427,7 @@ contains
    !> Shares of nodal diameters, which add up to 1.
    function shares(self, vector) result(share)
       class(ring_pencil), intent(in) :: self
+      !> Coordinates of all waves.
       complex(wp), intent(in) :: vector(:)
       real(wp) :: share(0:self%n_sectors/2)
       integer :: k, n

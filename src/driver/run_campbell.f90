@@ -84,6 +84,7 @@ module fw_run_campbell
 
 contains
 
+   !> All at once: there are no rows of points.
    subroutine start(self, case, run, error)
       class(campbell_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case
@@ -118,6 +119,7 @@ contains
       call read_lines(self, case, error)
    end subroutine check
 
+   !> The case of each order, its speed tied to its frequency.
    subroutine read_lines(self, case, error)
       class(campbell_analysis), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -157,7 +159,9 @@ contains
    !> What vibrates, at a rotation speed.
    subroutine turn(line, speed, body)
       type(line_type), intent(in) :: line
+      !> [rad/s]
       real(wp), intent(in) :: speed
+      !> With the matrices at that speed, and none that follow it.
       type(body_type), intent(out) :: body
 
       body = line%case%body_type
@@ -169,6 +173,7 @@ contains
    subroutine find_frequencies(self, case, group, error)
       class(campbell_analysis), intent(in) :: self
       type(case_type), intent(in) :: case
+      !> Speeds, nodal diameters and frequencies go there.
       type(campbell_group), intent(inout) :: group
       type(error_type), allocatable, intent(out) :: error
       type(natural_modes) :: modes
@@ -199,6 +204,7 @@ contains
    !> Nodal diameters that differ at a speed.
    function diameters_of(self, speed) result(list)
       class(campbell_analysis), intent(in) :: self
+      !> [rad/s]
       real(wp), intent(in) :: speed
       integer, allocatable :: list(:)
       type(body_type) :: body
@@ -220,6 +226,7 @@ contains
    subroutine find_crossings(self, case, group, error)
       class(campbell_analysis), intent(inout) :: self
       type(case_type), intent(in) :: case
+      !> With the frequencies of all speeds.
       type(campbell_group), intent(in) :: group
       type(error_type), allocatable, intent(out) :: error
       type(crossing_type), allocatable :: found(:)
@@ -253,10 +260,14 @@ contains
 
    !> Where a mode of the nodal diameter of an order has its frequency.
    subroutine find_roots(line, mode, group, closed, speeds, error)
+      !> The order whose nodal diameter is looked at.
       type(line_type), intent(in), target :: line
+      !> Of that nodal diameter, from 1.
       integer, intent(in) :: mode
       type(campbell_group), intent(in) :: group
+      !> Whether the pairs hold, or are left out.
       logical, intent(in) :: closed
+      !> Ascending; none where nothing is met [rad/s].
       real(wp), allocatable, intent(out) :: speeds(:)
       type(error_type), allocatable, intent(out) :: error
       type(distance_type) :: distance
@@ -289,9 +300,12 @@ contains
       end do
    end subroutine find_roots
 
+   !> Modes are those of the line at that speed.
    subroutine distance_at(self, x, value, error)
       class(distance_type), intent(inout) :: self
+      !> Rotation speed [rad/s].
       real(wp), intent(in) :: x
+      !> [rad/s]
       real(wp), intent(out) :: value
       type(error_type), allocatable, intent(out) :: error
       type(natural_modes) :: modes
@@ -314,7 +328,9 @@ contains
 
    !> Of the mode with its pairs closed.
    subroutine find_damping(line, crossing)
+      !> The order that meets it.
       type(line_type), intent(in) :: line
+      !> Its speed and mode are known.
       type(crossing_type), intent(inout) :: crossing
       type(mode_type), allocatable :: modes(:)
       type(body_type) :: body
@@ -330,8 +346,10 @@ contains
       crossing%damping_ratio = 0.5_wp*modes(k)%width/modes(k)%omega
    end subroutine find_damping
 
+   !> In the order of the orders, then mode, then speed.
    subroutine describe_crossings(self, group)
       class(campbell_analysis), intent(in) :: self
+      !> Takes what is known of crossings.
       type(campbell_group), intent(inout) :: group
 
       associate (c => self%crossing)
@@ -349,6 +367,7 @@ contains
       class(campbell_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(run_type), intent(inout), target :: run
+      !> Takes the peaks, in the order of the crossings.
       type(campbell_group), intent(inout) :: group
       type(error_type), allocatable, intent(out) :: error
       class(point_strategy), allocatable, target :: strategy
@@ -385,7 +404,9 @@ contains
 
    !> Frequencies across the window, and between the neighbours of the highest one its maximum.
    subroutine find_peak(crossing, height, omega, amplitude, error)
+      !> Its window is that of the mode, open and closed.
       type(crossing_type), intent(in) :: crossing
+      !> Ready for points along the order.
       type(height_type), intent(inout) :: height
       !> NaN where there is no maximum inside.
       real(wp), intent(inout) :: omega, amplitude(:)
@@ -415,9 +436,12 @@ contains
       if (.not. allocated(error)) amplitude = height%amplitude
    end subroutine find_peak
 
+   !> From the solutions of the frequencies before.
    subroutine height_at(self, x, value, error)
       class(height_type), intent(inout) :: self
+      !> [rad/s]
       real(wp), intent(in) :: x
+      !> [length]
       real(wp), intent(out) :: value
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
@@ -438,7 +462,9 @@ contains
    !> A line for each crossing.
    subroutine make_table(self, group, table)
       class(campbell_analysis), intent(in) :: self
+      !> With crossings, and peaks where they were looked for.
       type(campbell_group), intent(in) :: group
+      !> For the summary, a head first.
       type(string_type), allocatable, intent(out) :: table(:)
       character(120) :: line
       integer :: i

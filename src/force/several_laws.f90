@@ -123,6 +123,7 @@ contains
       joined(at) = growth
    end subroutine join_growth
 
+   !> What holds of all members.
    subroutine find_facts(self)
       class(several_laws), intent(inout) :: self
       type(law_facts), allocatable :: facts(:)
@@ -184,6 +185,7 @@ contains
       end do
    end subroutine take_prediction
 
+   !> Room of its own for each member, too.
    subroutine reserve(self, fourier, work)
       class(several_laws), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -200,6 +202,7 @@ contains
       call move_alloc(room, work%room)
    end subroutine reserve
 
+   !> Each member the forces of its pairs.
    subroutine evaluate(self, fourier, work)
       class(several_laws), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -209,6 +212,7 @@ contains
       call self%evaluate_rigid(fourier, work)
    end subroutine evaluate
 
+   !> Members that do not take the balance.
    subroutine evaluate_free(self, fourier, work)
       class(several_laws), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -217,6 +221,7 @@ contains
       call evaluate_members(self, .false., fourier, work)
    end subroutine evaluate_free
 
+   !> Members that do.
    subroutine evaluate_rigid(self, fourier, work)
       class(several_laws), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -279,6 +284,7 @@ contains
       if (own%measures_slip) work%slip(at) = own%slip
    end subroutine give_forces
 
+   !> Each member at the last point of all.
    subroutine linearize(self, fourier, work)
       class(several_laws), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -346,6 +352,7 @@ contains
       end select
    end subroutine coefficients
 
+   !> Forces above those of the balance, of each member.
    subroutine tail(self, work, highest, force)
       class(several_laws), intent(in) :: self
       type(force_workspace), intent(inout) :: work
@@ -364,6 +371,7 @@ contains
       end select
    end subroutine tail
 
+   !> Each member of its pairs.
    pure subroutine fractions(self, work, share)
       class(several_laws), intent(in) :: self
       type(force_workspace), intent(in) :: work
@@ -389,6 +397,7 @@ contains
       slope = self%member(self%of_member(element))%law%slope_at_rest(self%place(element), component)
    end function slope_at_rest
 
+   !> What follows asks the member that an element belongs to.
    pure logical function acts_alone(self, element)
       class(several_laws), intent(in) :: self
       integer, intent(in) :: element

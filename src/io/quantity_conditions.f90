@@ -15,12 +15,14 @@ module fw_quantity_conditions
 
 contains
 
+   !> Rows of stress are there and wanted.
    pure logical function has_stress(case)
       type(case_type), intent(in) :: case
 
       has_stress = case%stress%is_wanted()
    end function has_stress
 
+   !> Their components too.
    pure logical function has_tensor(case)
       type(case_type), intent(in) :: case
 
@@ -34,6 +36,7 @@ contains
       has_endurance = case%stress%is_judged()
    end function has_endurance
 
+   !> Of every case.
    pure logical function always(case)
       type(case_type), intent(in) :: case
 
@@ -49,12 +52,14 @@ contains
       is_response = analyses(case%analysis)%is_response
    end function is_response
 
+   !> Supports or the ground move.
    pure logical function moves_base(case)
       type(case_type), intent(in) :: case
 
       moves_base = allocated(case%model%base_parts)
    end function moves_base
 
+   !> A nonlinear mode.
    pure logical function is_mode(case)
       type(case_type), intent(in) :: case
 
@@ -75,6 +80,7 @@ contains
       follows_frequency = follows_branch(case) .and. .not. case%over%is_wanted()
    end function follows_frequency
 
+   !> The points go over a parameter, not over the frequency.
    pure logical function follows_parameter(case)
       type(case_type), intent(in) :: case
 
@@ -106,12 +112,14 @@ contains
       goes_over = case%over%is_wanted()
    end function goes_over
 
+   !> Points have a factor of their load.
    pure logical function scales_load(case)
       type(case_type), intent(in) :: case
 
       scales_load = case%over%number == harmonic_scale .or. case%control%is_wanted()
    end function scales_load
 
+   !> Amplitudes are given in place of the load.
    pure logical function is_controlled(case)
       type(case_type), intent(in) :: case
 
@@ -139,6 +147,7 @@ contains
       is_accurate = case%harmonics%accuracy > 0.0_wp
    end function is_accurate
 
+   !> Floquet multipliers are found.
    pure logical function asks_stability(case)
       type(case_type), intent(in) :: case
 
@@ -159,6 +168,7 @@ contains
       is_mission = wears(case) .and. case%mission%is_wanted()
    end function is_mission
 
+   !> The joint wears.
    pure logical function wears(case)
       type(case_type), intent(in) :: case
 

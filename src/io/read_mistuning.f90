@@ -81,7 +81,9 @@ contains
    !> What sectors have beside each other; nothing where that is nothing.
    subroutine read_mistuning(reader, raw, cyclic)
       type(reader_type), intent(inout) :: reader
+      !> The model as it was given; takes what the group says.
       type(raw_model), intent(inout) :: raw
+      !> Takes the deviation of the matrices.
       type(cyclic_type), intent(inout) :: cyclic
       type(mistuning_options) :: options
 
@@ -110,8 +112,11 @@ contains
    !> What the namelist gives stands in place of what the model says.
    subroutine merge_parts(reader, options, n_sectors, parts)
       type(reader_type), intent(inout) :: reader
+      !> What the group says.
       type(mistuning_options), intent(in) :: options
+      !> N.
       integer, intent(in) :: n_sectors
+      !> Those of the model, with those of the group on return.
       type(mistuning_parts), intent(inout) :: parts
       integer :: r
 
@@ -172,8 +177,11 @@ contains
    !> What the parts must be to each other.
    subroutine check_parts(reader, scale, raw, n_sectors)
       type(reader_type), intent(inout) :: reader
+      !> Of all deviations.
       real(wp), intent(in) :: scale
+      !> With the parts merged.
       type(raw_model), intent(inout) :: raw
+      !> N.
       integer, intent(in) :: n_sectors
       integer :: at(2), j, n, r
 
@@ -262,7 +270,9 @@ contains
 
    subroutine check_sector(reader, own, j, n)
       type(reader_type), intent(inout) :: reader
+      !> Of one sector.
       type(sector_parts), intent(inout) :: own
+      !> Which, from 0, and the dofs of a sector.
       integer, intent(in) :: j, n
       character(:), allocatable :: message
 
@@ -293,8 +303,11 @@ contains
 
    !> Rows that all sectors share, then the matrices of each on them.
    subroutine form_deviation(scale, raw, cyclic)
+      !> Of all deviations.
       real(wp), intent(in) :: scale
+      !> With parts that fit each other.
       type(raw_model), intent(inout) :: raw
+      !> Its deviation is formed here.
       type(cyclic_type), intent(inout) :: cyclic
       type(deviation_type) :: deviation
       integer :: j
@@ -352,6 +365,7 @@ contains
 
    !> Largest column.
    pure real(wp) function size_of(matrix)
+      !> Symmetric.
       real(wp), allocatable, intent(in) :: matrix(:, :)
 
       size_of = 0.0_wp
@@ -360,7 +374,9 @@ contains
 
    !> Whole matrices of a sector become what they have beside the tuned ones.
    subroutine take_off(raw, own)
+      !> Its mass is that of the tuned sector.
       type(raw_model), intent(in) :: raw
+      !> Of one sector.
       type(sector_parts), intent(inout) :: own
 
       if (.not. allocated(own%kind)) return
@@ -375,7 +391,9 @@ contains
    !> Masses that some sector makes negative.
    subroutine check_masses(reader, raw, cyclic)
       type(reader_type), intent(inout) :: reader
+      !> Its mass is that of the tuned sector.
       type(raw_model), intent(in) :: raw
+      !> With the deviation.
       type(cyclic_type), intent(in) :: cyclic
       integer :: j
       real(wp) :: limit
@@ -398,6 +416,7 @@ contains
 
    !> Lowest eigenvalue.
    real(wp) function lowest(matrix)
+      !> Symmetric (n, n).
       real(wp), intent(in) :: matrix(:, :)
       real(wp), allocatable :: unit(:, :), values(:), vectors(:, :)
       integer :: i

@@ -299,6 +299,7 @@ contains
       state%self_excitation = self_excitation
    end subroutine at
 
+   !> The matrices and loads of all harmonics.
    subroutine form_all(self, state, omega, n_failed)
       class(cyclic_structure), intent(in) :: self
       type(cyclic_state), intent(inout) :: state
@@ -320,6 +321,7 @@ contains
       !$omp end parallel do
    end subroutine form_all
 
+   !> Z q of all harmonics.
    subroutine multiply(self, state, q, product)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(inout) :: state
@@ -332,6 +334,7 @@ contains
       end select
    end subroutine multiply
 
+   !> Products and blocks from now on are of some coordinates alone.
    subroutine restrict(self, state, n_active, n_used, used)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(inout) :: state
@@ -355,6 +358,7 @@ contains
       end select
    end subroutine restrict
 
+   !> Z v of these.
    subroutine multiply_active(self, state, v, product)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(inout) :: state
@@ -395,6 +399,7 @@ contains
       has_near_product = self%n_coordinates >= sizes%single_matrices
    end function has_near_product
 
+   !> Z_n as a real matrix.
    subroutine block_of_all(self, state, h, matrix)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -409,6 +414,7 @@ contains
       end select
    end subroutine block_of_all
 
+   !> The same of the coordinates in use.
    subroutine block_in_use(self, state, h, matrix)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -536,6 +542,7 @@ contains
       end associate
    end subroutine parts
 
+   !> Which basis harmonic 1 has, or else the first harmonic.
    pure integer function of_first_harmonic(self) result(basis)
       class(cyclic_structure), intent(in) :: self
 
@@ -555,6 +562,7 @@ contains
       end associate
    end subroutine held_modes
 
+   !> Sums of the absolute values in a row of Z_n q: the size of its round-off.
    pure subroutine magnitudes(self, state, h, amplitude, sums)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(in) :: state

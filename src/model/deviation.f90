@@ -34,6 +34,7 @@ contains
 
    pure subroutine start(self, n_dof)
       class(deviation_type), intent(inout) :: self
+      !> Of a sector.
       integer, intent(in) :: n_dof
 
       if (allocated(self%rows)) deallocate (self%rows)
@@ -43,6 +44,7 @@ contains
    !> Rows that deviations act on.
    pure subroutine add_rows(self, rows)
       class(deviation_type), intent(inout) :: self
+      !> (n_rows, n_dof)
       real(wp), intent(in) :: rows(:, :)
       real(wp) :: row(size(rows, 2)), size_of_row
       integer :: i
@@ -58,7 +60,9 @@ contains
    !> What is left of a row beside those that there are, made a row where it is no round-off.
    pure subroutine append(self, row, limit)
       class(deviation_type), intent(inout) :: self
+      !> (n_dof)
       real(wp), intent(inout) :: row(:)
+      !> Length up to which what is left is round-off.
       real(wp), intent(in) :: limit
       real(wp), allocatable :: longer(:, :)
       integer :: pass, r
@@ -78,6 +82,7 @@ contains
    !> Rows that a symmetric matrix acts on.
    pure subroutine add_range(self, matrix, size_of_tuned)
       class(deviation_type), intent(inout) :: self
+      !> Symmetric (n_dof, n_dof).
       real(wp), intent(in) :: matrix(:, :)
       !> Of the matrices whose difference it is; 0 of one that was given.
       real(wp), intent(in) :: size_of_tuned
@@ -106,7 +111,9 @@ contains
 
    !> Take off what acts on a row.
    pure subroutine deflate(row, left)
+      !> Of unit length (n_dof).
       real(wp), intent(in) :: row(:)
+      !> The matrix, without what acts on rows that there are (n_dof, n_dof).
       real(wp), intent(inout) :: left(:, :)
       real(wp) :: along(size(left, 2))
       integer :: j
@@ -120,6 +127,7 @@ contains
    !> All rows are there: those of single dofs where they say as much. Nothing deviates yet.
    pure subroutine settle(self, n_sectors)
       class(deviation_type), intent(inout) :: self
+      !> N.
       integer, intent(in) :: n_sectors
       integer, allocatable :: touched(:)
       integer :: i, n

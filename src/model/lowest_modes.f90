@@ -92,9 +92,13 @@ contains
 
    !> Cholesky factor of K + shift M.
    subroutine factor_shifted(mass, stiffness, square, factor, shift, done)
+      !> [mass], [force/length] (n, n), [(rad/s)**2].
       real(wp), intent(in) :: mass(:, :), stiffness(:, :), square
+      !> Lower triangle (n, n).
       real(wp), allocatable, intent(out) :: factor(:, :)
+      !> The first of the trials that makes it positive definite [(rad/s)**2].
       real(wp), intent(out) :: shift
+      !> False where none does.
       logical, intent(out) :: done
       integer :: n, k, info
 
@@ -110,6 +114,7 @@ contains
 
    !> Number of modes below a square of a frequency, by Sylvester's law; -1 where it is not known.
    function n_below(mass, stiffness, square) result(count_below)
+      !> As above.
       real(wp), intent(in) :: mass(:, :), stiffness(:, :), square
       integer :: count_below
       real(wp), allocatable :: factors(:, :), work(:)
@@ -131,6 +136,7 @@ contains
 
    !> Without any symmetry, and the same every time.
    pure function first_block(n) result(block)
+      !> Order of the pencil.
       integer, intent(in) :: n
       real(wp), allocatable :: block(:, :)
       integer :: i, j
@@ -145,8 +151,11 @@ contains
 
    !> Vectors that are the block's own join the space; none where the space holds all.
    subroutine add_block(mass, factor, block, space, done)
+      !> (n, n)
       real(wp), contiguous, intent(in) :: mass(:, :), factor(:, :)
+      !> Vectors; what they have beyond the space on return (n, width).
       real(wp), intent(inout) :: block(:, :)
+      !> Grows by the block.
       type(space_type), intent(inout) :: space
       !> False where a vector has a negative mass.
       logical, intent(out) :: done
@@ -189,10 +198,13 @@ contains
 
    !> Whether all modes up to the bound, and one above it, are in the space.
    function are_found(mass, beyond, vectors, values, shift, square, is_whole) result(found)
+      !> (n, n)
       real(wp), contiguous, intent(in) :: mass(:, :)
       !> What the last block leaves (n, width), eigenvectors of the space and their values.
       real(wp), intent(in) :: beyond(:, :), vectors(:, :), values(:)
+      !> Of the factorization, and the highest that is wanted [(rad/s)**2].
       real(wp), intent(in) :: shift, square
+      !> Whether the space holds everything.
       logical, intent(in) :: is_whole
       logical :: found
       real(wp) :: moved(size(beyond, 1), size(beyond, 2)), gram(size(beyond, 2), size(beyond, 2))
@@ -235,7 +247,9 @@ contains
 
    !> Solutions by the Cholesky factor, in place of the right-hand sides.
    subroutine solve(factor, block)
+      !> (n, n)
       real(wp), contiguous, intent(in) :: factor(:, :)
+      !> Solved in place (n, width).
       real(wp), intent(inout) :: block(:, :)
       real(wp), allocatable :: right(:, :)
       integer :: n

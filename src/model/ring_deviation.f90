@@ -38,8 +38,11 @@ contains
 
    !> The rows stand behind all others of a sector.
    subroutine new_ring_deviation(deviation, cyclic, relative, self)
+      !> In dofs of a sector.
       type(deviation_type), intent(in) :: deviation
+      !> How the sectors stand.
       type(cyclic_type), intent(in) :: cyclic
+      !> Rows that are coordinates of all nodal diameters.
       type(cyclic_relative), intent(in) :: relative
       type(ring_deviation), intent(out) :: self
       integer, allocatable :: slot(:), behind(:)
@@ -71,7 +74,9 @@ contains
       class(ring_deviation), intent(in) :: self
       !> Factors of the stiffness, the mass and the damping: Z = k K - theta M + i s C.
       real(wp), intent(in) :: k, s
+      !> s**2 of the harmonic, with what excites itself.
       complex(wp), intent(in) :: theta
+      !> (n_rows, n_rows, n_sectors)
       complex(wp), intent(out) :: matrix(:, :, :)
 
       matrix = k*self%part(:, :, :, stiffness_part) - theta*self%part(:, :, :, mass_part) + &
@@ -81,6 +86,7 @@ contains
    !> The rows of every sector, from the coordinates of all (slot, sector).
    pure subroutine read_rows(self, sectors, rows)
       class(ring_deviation), intent(in) :: self
+      !> (slot, sector)
       complex(wp), intent(in) :: sectors(:, :)
       !> (n_rows, n_sectors)
       complex(wp), intent(out) :: rows(:, :)
@@ -101,7 +107,9 @@ contains
    !> matrices where these are given.
    pure subroutine add_rows(self, rows, sectors, matrix)
       class(ring_deviation), intent(in) :: self
+      !> (n_rows, n_sectors)
       complex(wp), intent(in) :: rows(:, :)
+      !> (slot, sector)
       complex(wp), intent(inout) :: sectors(:, :)
       !> (n_rows, n_rows, n_sectors)
       complex(wp), intent(in), optional :: matrix(:, :, :)
@@ -129,7 +137,9 @@ contains
    !> The mean of the matrices in every wave (slots, slots, n_sectors); it is taken off.
    pure subroutine add_mean(self, matrix, wave)
       class(ring_deviation), intent(in) :: self
+      !> Of each sector; less their mean on return (n_rows, n_rows, n_sectors).
       complex(wp), intent(inout) :: matrix(:, :, :)
+      !> Gains the mean.
       complex(wp), intent(inout) :: wave(:, :, :)
       complex(wp) :: mean(self%n_rows, self%n_rows)
       integer :: j, k, m
@@ -149,6 +159,7 @@ contains
    !> sector).
    pure subroutine add_block(self, matrix, row, column, block)
       class(ring_deviation), intent(in) :: self
+      !> (n_rows, n_rows, n_sectors)
       complex(wp), intent(in) :: matrix(:, :, :)
       integer, intent(in) :: row(:, :), column(:, :)
       complex(wp), intent(inout) :: block(:, :)
@@ -173,6 +184,7 @@ contains
       end do
    end subroutine add_block
 
+   !> The sector that stands so many places before another; from 1.
    pure integer function other(self, sector, behind)
       class(ring_deviation), intent(in) :: self
       integer, intent(in) :: sector, behind
