@@ -39,6 +39,7 @@ module fw_read_mistuning
       real(wp), allocatable :: blade_stiffness(:, :), blade_mass(:, :)
    contains
       procedure :: bind_keys
+      procedure :: asks_for_sectors
    end type mistuning_options
 
 contains
@@ -78,6 +79,17 @@ contains
       call keys%bind(key('scale', 'multiplies all deviations', only=where_used), self%scale)
    end subroutine bind_keys
 
+   !> Whether something else than the defaults is given, which stand in every case that is written.
+   pure logical function asks_for_sectors(self) result(asks)
+      class(mistuning_options), intent(in) :: self
+
+      asks = self%n_rows > 0 .or. abs(self%scale - 1.0_wp) > 0.0_wp .or. allocated(self%rows) .or. &
+             allocated(self%row_omega) .or. allocated(self%frequency) .or. &
+             allocated(self%damping_ratio) .or. allocated(self%stiffness) .or. &
+             allocated(self%mass) .or. allocated(self%blade_stiffness) .or. &
+             allocated(self%blade_mass)
+   end function asks_for_sectors
+
    !> What sectors have beside each other; nothing where that is nothing.
    subroutine read_mistuning(reader, raw, cyclic)
       type(reader_type), intent(inout) :: reader
@@ -89,7 +101,7 @@ contains
 
       call options%bind_keys(reader)
       if (reader%failed()) return
-      if (.not. cyclic%is_cyclic .and. reader%has_group('mistuning')) then
+      if (.not. cyclic%is_cyclic .and. options%asks_for_sectors()) then
          call reader%refuse('mistuning', 'scale', 'and the other keys of the group need '// &
                             'sectors: give &cyclic n_sectors, or leave the group out')
          return

@@ -472,12 +472,14 @@ contains
 
       hint = hint_of_former_key(group, name)
       if (len(hint) > 0) return
+      ! A part of a name of the group itself is nearer than a key of another.
+      hint = near_part(name, self%records%keys(group))
+      if (len(hint) > 0) return
       do i = 1, size(self%records%groups)
          if (.not. self%records%has(self%records%groups(i)%text, name)) cycle
          if (len(hint) > 0) hint = hint//', &'//self%records%groups(i)%text
          if (len(hint) == 0) hint = '; it is a key of &'//self%records%groups(i)%text
       end do
-      if (len(hint) == 0) hint = near_part(name, self%records%keys(group))
       if (len(hint) == 0) hint = near(name, self%records%keys(group))
    end function hint_for
 

@@ -179,11 +179,11 @@ def add_part(toy):
 
 
 def add_parameter(toy):
-    """'contact%slip_speed': a constant of a law that sweeps go over."""
+    """'contact%mu_viscous': a constant of a law that sweeps go over."""
     toy.change("src/model/parameters.f90",
                (")]\n\n   integer, parameter :: n_parameter_words",
                 "), &\n"
-                "      parameter_type('contact%slip_speed', of_pairs, positive, of_sliding, &\n"
+                "      parameter_type('contact%mu_viscous', of_pairs, not_negative, of_sliding, &\n"
                 "                     .false.)]\n\n   integer, parameter :: n_parameter_words"))
 
 
@@ -414,8 +414,9 @@ def test_part_is_checked(built, tmp_path):
 
 
 def test_parameter_is_swept(built, tmp_path):
-    text = RUBBING.format(law="regularised", more="")
-    sweep = "&sweep frequency = 0.9, parameter = 'contact%slip_speed', as = 'value', values = {} /"
+    text = RUBBING.format(law="regularised", more="").replace(
+        "slip_speed = 0.1", "slip_speed = 0.1, mu_viscous = 0.1")
+    sweep = "&sweep frequency = 0.9, parameter = 'contact%mu_viscous', as = 'value', values = {} /"
     found = []
     for values in ("0.1, 0.2", "0.2"):
         done = run(built[0], tmp_path, "parameter",
@@ -423,7 +424,7 @@ def test_parameter_is_swept(built, tmp_path):
         assert done.returncode == 0, done.stderr
         with h5py.File(tmp_path / "parameter.h5") as file:
             found.append(file["amplitude"][-1])
-    done = run(built[0], tmp_path, "alone", text.replace("slip_speed = 0.1", "slip_speed = 0.2")
+    done = run(built[0], tmp_path, "alone", text.replace("mu_viscous = 0.1", "mu_viscous = 0.2")
                .replace("start = 0.8, end = 1.2, n_points = 5", "values = 0.9"))
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "alone.h5") as file:
@@ -433,10 +434,12 @@ def test_parameter_is_swept(built, tmp_path):
 
 
 def test_parameter_has_no_slope(built, tmp_path):
-    more = "&sensitivity parameters = 'contact%slip_speed' /"
-    done = run(built[0], tmp_path, "slope", RUBBING.format(law="regularised", more=more))
+    more = "&sensitivity parameters = 'contact%mu_viscous' /"
+    text = RUBBING.format(law="regularised", more=more).replace(
+        "slip_speed = 0.1", "slip_speed = 0.1, mu_viscous = 0.1")
+    done = run(built[0], tmp_path, "slope", text)
     assert done.returncode == 3
-    assert "contact%slip_speed': its derivative is not known" in done.stderr
+    assert "contact%mu_viscous': its derivative is not known" in done.stderr
 
 
 def vibrate(program, folder, name, load, more, sweep="n_points = 5"):
