@@ -180,7 +180,6 @@ REFUSED = {
     "no sectors": ({"cyclic": {"n_sectors": None, "engine_order": None, "n_interface": None,
                                "left": None, "right": None}, "contact": {"sector_2": 0}},
                    ["mistuned", "n_sectors"]),
-    "natural frequencies": ({"case": {"analysis": "modes"}}, ["analysis", "mistuned"]),
     "in time": ({"case": {"analysis": "time"}}, ["analysis", "mistuned"]),
     "accuracy": ({"harmonics": {"n_harmonics": None}}, ["accuracy", "n_harmonics", "mistuned"]),
     "collocation": ({"harmonics": {"method": "tcm"}}, ["method", "mistuned", "'hbm'"]),
