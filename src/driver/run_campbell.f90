@@ -23,7 +23,6 @@ module fw_run_campbell
    use fw_strategy, only: new_request, point_strategy
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
-   use fw_values, only: number_text
    implicit none (type, external)
    private
 
@@ -142,12 +141,12 @@ contains
             if (case%model%cyclic%has_sectors()) call append(changes, 'cyclic%engine_order='// &
                                                              to_text(e))
             call append(changes, "sweep%unit='rad/s'")
-            call append(changes, 'sweep%start='//number_text(ends(1)))
-            call append(changes, 'sweep%end='//number_text(ends(2)))
+            call append(changes, 'sweep%start='//trim(full_number(ends(1))))
+            call append(changes, 'sweep%end='//trim(full_number(ends(2))))
             call append(changes, 'sweep%n_points='//to_text(case%campbell%n_points))
             if (case%model%turns) call append(changes, 'sweep%speed_order='//to_text(abs(e)))
-            call append(changes, 'load%harmonic_scale='//number_text( &
-                        case%model%harmonic_scale*case%campbell%scale_of(i)))
+            call append(changes, 'load%harmonic_scale='//trim(full_number( &
+                        case%model%harmonic_scale*case%campbell%scale_of(i))))
             allocate (line%case)
             call read_changed(case, changes, 'engine order '//to_text(e), line%case, error)
             if (allocated(error)) return
@@ -155,6 +154,15 @@ contains
          end associate
       end do
    end subroutine read_lines
+
+   !> All digits, in a text of fixed length: texts of others stand in static memory.
+   pure function full_number(value) result(text)
+      real(wp), intent(in) :: value
+      character(32) :: text
+
+      write (text, '(es24.16e3)') value
+      text = adjustl(text)
+   end function full_number
 
    !> What vibrates, at a rotation speed.
    subroutine turn(line, speed, body)
