@@ -72,14 +72,18 @@ contains
                call add_outputs(self, entry, work, not_open(p, work, .false.), &
                                 self%problem%incidence%identity, m, dr)
             end if
-            if (in_time .and. p%grows()) call add_law_by_frequency(self, entry, work, m, nc, dr)
+            if (in_time .and. p%grows() .and. p%some_are_free()) then
+               call add_law_by_frequency(self, entry, entry%free_rows, work, m, nc, dr)
+            end if
             if (.not. p%takes_balance) cycle
             call inputs_by_point(self, entry, in_time, m, nc, q, dr, work%input)
             call multiply_derivative(entry%row, work)
             call add_outputs(self, entry, work, not_open(p, work, .true.), &
                              self%problem%incidence%identity, m, dr)
-            if (p%has_inertia .and. in_time .and. .not. p%grows()) then
-               call add_law_by_frequency(self, entry, work, m, nc, dr)
+            if (in_time .and. p%grows()) then
+               call add_law_by_frequency(self, entry, entry%rigid_rows, work, m, nc, dr)
+            else if (in_time .and. p%has_inertia) then
+               call add_law_by_frequency(self, entry, entry%rows, work, m, nc, dr)
             end if
          end associate
       end do
@@ -100,9 +104,12 @@ contains
 
    !> A law with inertia in units of time depends on the frequency by itself, and one whose gaps
    !> grow with a speed that follows it: a central difference, its inputs being held.
-   subroutine add_law_by_frequency(self, entry, work, m, nc, dr)
+   subroutine add_law_by_frequency(self, entry, rows, work, m, nc, dr)
       type(balance_state), intent(inout) :: self
       type(force_entry), intent(in) :: entry
+      !> Of the elements that are differentiated: those that do not take the balance are a part of
+      !> it, and come first.
+      integer, intent(in) :: rows(:)
       type(force_workspace), intent(inout) :: work
       integer, intent(in) :: m, nc
       real(wp), intent(inout) :: dr(m, nc)
@@ -117,7 +124,7 @@ contains
          work%rate = self%frequency() + side*step
          if (entry%law%prediction%grows()) call entry%law%set_offset(self%depth, work)
          call entry%law%evaluate(self%problem%fourier, work)
-         call self%problem%incidence%scatter(entry%rows, m, nc, 0.5_wp*side/step, work%force, dr)
+         call self%problem%incidence%scatter(rows, m, nc, 0.5_wp*side/step, work%force, dr)
       end do
       ! And back: what an evaluation leaves in `work` belongs to the present frequency.
       work%rate = self%frequency()

@@ -52,6 +52,34 @@ def test_a_row_of_an_order_line_is_a_point_of_that_speed(tmp_path, number):
         assert np.abs(rows[k] - point).max() <= 1e-10 * np.abs(point).max()
 
 
+@pytest.mark.parametrize("law", ["penalty", "rigid", "dlft"])
+def test_a_branch_leaves_in_the_direction_of_its_points(tmp_path, law):
+    """dR/d omega with normal loads that grow with the speed: tangents against differences."""
+    datasets = {"mass": np.diag([1.0, 0.6]), "stiffness": [[2.0, -0.8], [-0.8, 1.4]],
+                "damping": 0.06 * np.eye(2), "stiffness_rotation": np.diag([0.1, 0.2]),
+                "load/cosine": [1.0, 0.0], "contact/side_1": np.array([[2, 0, 0]], np.int32),
+                "contact/side_2": np.array([[0, 0, 0]], np.int32), "contact/mu": 0.3,
+                "contact/normal_load": 0.4, "contact/normal_load_rotation": 0.9}
+    if law == "penalty":
+        datasets["contact/tangential_stiffness"] = 1.5
+    write_model(tmp_path / "model.h5", datasets)
+    case = with_model({"contact": {"law": law}, "harmonics": {"n_harmonics": 3, "n_time": 256}
+                       if law == "dlft" else {"n_harmonics": 3}, "solver": {"tolerance": 1e-12}})
+    run(tmp_path, {**case, "sweep": {"start": 0.7, "end": 0.8, "n_points": 6, "speed_order": 2,
+                                     "continuation": "arclength"}})
+    with h5py.File(tmp_path / "case.h5") as file:
+        omega = file["omega"][()]
+        tangents = file["tangent/coefficients"][()] / file["tangent/omega"][()][:, None, None]
+    step = 1e-4
+    at = np.array([w + sign * step for w in omega[1:-1] for sign in (-1.0, 1.0)])
+    run(tmp_path, {**case, "sweep": {"values": at.tolist(), "speed_order": 2}})
+    with h5py.File(tmp_path / "case.h5") as file:
+        points = file["coefficients"][()]
+    wanted = (points[1::2] - points[::2]) / (2.0 * step)
+    # Truncation of the difference, step**2, and 1e-12 over the step.
+    assert np.abs(tangents[1:-1] - wanted).max() <= 1e-4 * np.abs(wanted).max()
+
+
 def small_sector(path, **others):
     """Six sectors of two masses with stiffening and Coriolis forces."""
     write_model(path, {
