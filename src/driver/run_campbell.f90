@@ -9,7 +9,7 @@ module fw_run_campbell
    use fw_analysis, only: analysis, run_type
    use fw_body, only: body_type
    use fw_campbell_group, only: campbell_group
-   use fw_campbell_search, only: find_largest, find_root, function_of_one
+   use fw_scalar_search, only: find_largest, find_root, function_of_one
    use fw_case, only: case_type
    use fw_changed_case, only: read_changed
    use fw_error, only: error_type, status_stopped

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from annulus import random_case
-from cases import read, run
+from cases import read, run, with_model, write_parts
 from cyclic_cases import difference
 from deviations import annulus, draw, write
 from project import ROOT
@@ -26,30 +26,11 @@ EQUAL = 1e-9
 SAME = 1e-11
 
 
-def write_model(path, datasets):
-    with h5py.File(path, "w") as file:
-        file.attrs["format"], file.attrs["format_version"] = "fretwear-model", 1
-        for name, values in datasets.items():
-            group, _, attribute = name.partition("@")
-            if attribute:
-                file.require_group(group or "/").attrs[attribute] = values
-            else:
-                file[name] = np.array(values)
-
-
-def groups_of(case):
-    groups = {group: dict(keys) for group, keys in case.items()}
-    sweep = groups.get("sweep", {})
-    if "frequencies" in sweep:
-        sweep["values"] = sweep.pop("frequencies")
-    return groups | {"model": {"source": "hdf5", "file": "model.h5"} | groups.get("model", {})}
-
-
 @pytest.mark.parametrize(("name", "number"), RUNS)
 def test_other_programs(tmp_path, name, number):
-    write_model(tmp_path / "model.h5", REFERENCE[name]["file"])
+    write_parts(tmp_path / "model.h5", REFERENCE[name]["file"])
     wanted = REFERENCE[name]["runs"][number]
-    run(tmp_path, groups_of(wanted["case"]))
+    run(tmp_path, with_model(wanted["case"]))
     with h5py.File(tmp_path / "case.h5") as file:
         for row in wanted["expect"]:
             values = np.array(row["value"])

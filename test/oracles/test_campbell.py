@@ -8,9 +8,8 @@ import json
 import h5py
 import numpy as np
 import pytest
-from cases import run
+from cases import run, with_model, write_parts
 from project import ROOT
-from test_stress_cycle import with_model, write_model
 
 REFERENCE = json.loads((ROOT / "test/reference/blades/b5_speed.json").read_text())
 
@@ -27,7 +26,7 @@ def differences(path, expect):
 
 @pytest.mark.parametrize("number", range(len(REFERENCE["runs"])))
 def test_along_an_order(tmp_path, number):
-    write_model(tmp_path / "model.h5", REFERENCE["file"])
+    write_parts(tmp_path / "model.h5", REFERENCE["file"])
     wanted = REFERENCE["runs"][number]
     run(tmp_path, with_model(wanted["case"]))
     for name, error, limit in differences(tmp_path / "case.h5", wanted["expect"]):
@@ -36,7 +35,7 @@ def test_along_an_order(tmp_path, number):
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_a_row_of_an_order_line_is_a_point_of_that_speed(tmp_path, number):
-    write_model(tmp_path / "model.h5", REFERENCE["file"])
+    write_parts(tmp_path / "model.h5", REFERENCE["file"])
     case = with_model(REFERENCE["runs"][number]["case"])
     run(tmp_path, case)
     with h5py.File(tmp_path / "case.h5") as file:
@@ -62,7 +61,7 @@ def test_a_branch_leaves_in_the_direction_of_its_points(tmp_path, law):
                 "contact/normal_load": 0.4, "contact/normal_load_rotation": 0.9}
     if law == "penalty":
         datasets["contact/tangential_stiffness"] = 1.5
-    write_model(tmp_path / "model.h5", datasets)
+    write_parts(tmp_path / "model.h5", datasets)
     case = with_model({"contact": {"law": law}, "harmonics": {"n_harmonics": 3, "n_time": 256}
                        if law == "dlft" else {"n_harmonics": 3}, "solver": {"tolerance": 1e-12}})
     run(tmp_path, {**case, "sweep": {"start": 0.7, "end": 0.8, "n_points": 6, "speed_order": 2,
@@ -82,7 +81,7 @@ def test_a_branch_leaves_in_the_direction_of_its_points(tmp_path, law):
 
 def small_sector(path, **others):
     """Six sectors of two masses with stiffening and Coriolis forces."""
-    write_model(path, {
+    write_parts(path, {
         "mass": np.diag([1.0, 0.4, 1.0]) + 0.0, "stiffness":
         [[3.0, -1.0, -0.5], [-1.0, 1.6, 0.0], [-0.5, 0.0, 1.0]],
         "damping": 0.01 * np.eye(3), "stiffness_rotation": np.diag([0.1, 0.3, 0.1]),
@@ -138,7 +137,7 @@ def test_loads_of_orders_are_scaled(tmp_path):
     assert heights[1] == pytest.approx(factor * heights[0], rel=1e-7)
 
 
-@pytest.mark.parametrize("change, words", [
+@pytest.mark.parametrize(("change", "words"), [
     ({"campbell": {"orders": [2, 0]}}, "engine orders other than 0"),
     ({"campbell": {"end": 0.01}}, "must be above start"),
     ({"campbell": {"order_scale": [1.0, 2.0]}}, "one for each of the 4 orders"),

@@ -10,7 +10,7 @@ from itertools import pairwise
 import h5py
 import numpy as np
 import pytest
-from cases import run
+from cases import run, with_model, write_parts
 from project import ROOT
 from scipy.optimize import minimize
 
@@ -18,25 +18,9 @@ REFERENCE = json.loads((ROOT / "test/reference/blades/b7_stress.json").read_text
 INSTANTS = 360
 
 
-def write_model(path, datasets):
-    with h5py.File(path, "w") as file:
-        file.attrs["format"], file.attrs["format_version"] = "fretwear-model", 1
-        for name, values in datasets.items():
-            group, _, attribute = name.partition("@")
-            if attribute:
-                file.require_group(group or "/").attrs[attribute] = values
-            else:
-                file[name] = np.array(values)
-
-
-def with_model(case):
-    return {group: dict(keys) for group, keys in case.items()} | {
-        "model": {"source": "hdf5", "file": "model.h5"} | case.get("model", {})}
-
-
 @pytest.mark.parametrize("number", range(len(REFERENCE["runs"])))
 def test_sector_at_speed(tmp_path, number):
-    write_model(tmp_path / "model.h5", REFERENCE["file"])
+    write_parts(tmp_path / "model.h5", REFERENCE["file"])
     wanted = REFERENCE["runs"][number]
     run(tmp_path, with_model(wanted["case"]))
     with h5py.File(tmp_path / "case.h5") as file:
@@ -100,7 +84,7 @@ def by_search(coefficients):
 @pytest.mark.parametrize("n_harmonics", [1, 2, 3, 5])
 def test_random_cycles_by_range(tmp_path, n_harmonics):
     datasets, case = structure(n_harmonics, 25, n_harmonics)
-    write_model(tmp_path / "model.h5", datasets)
+    write_parts(tmp_path / "model.h5", datasets)
     run(tmp_path, with_model(case))
     with h5py.File(tmp_path / "case.h5") as file:
         found = {name: file[f"stress/{name}"][0] for name in file["stress"]}
@@ -118,7 +102,7 @@ def test_random_cycles_by_range(tmp_path, n_harmonics):
 def test_random_cycles_with_their_sign(tmp_path, n_harmonics):
     datasets, case = structure(10 + n_harmonics, 25, n_harmonics)
     case["stress"] |= {"method": "signed", "diagram": "gerber"}
-    write_model(tmp_path / "model.h5", datasets)
+    write_parts(tmp_path / "model.h5", datasets)
     run(tmp_path, with_model(case))
     with h5py.File(tmp_path / "case.h5") as file:
         found = {name: file[f"stress/{name}"][0] for name in file["stress"]}
@@ -144,7 +128,7 @@ def test_stress_of_a_speed_that_follows(tmp_path):
     datasets |= {"stress/static_rotation": random.normal(size=(3, 6)),
                  "stiffness_rotation": 0.1 * np.eye(6),
                  "load/static_rotation": random.normal(size=6)}
-    write_model(tmp_path / "model.h5", datasets)
+    write_parts(tmp_path / "model.h5", datasets)
     omega = [0.5, 0.9, 1.4]
     groups = with_model(case)
     groups["case"] = {"analysis": "frf"}
@@ -166,7 +150,7 @@ def test_stress_of_a_speed_that_follows(tmp_path):
 def test_nothing_else_changes(tmp_path):
     """Rows of stress leave the response as it is, along a branch and to an accuracy too."""
     case = REFERENCE["runs"][0]["case"]
-    write_model(tmp_path / "model.h5", REFERENCE["file"])
+    write_parts(tmp_path / "model.h5", REFERENCE["file"])
     ways = ({"harmonics": {"n_harmonics": 3}}, {"harmonics": {"accuracy": 1e-3}},
             {"harmonics": {"n_harmonics": 3}, "sweep": {
                 "start": 1.0, "end": 1.2, "n_points": 5, "continuation": "arclength"},
@@ -197,14 +181,14 @@ def test_wrong_models_are_refused(tmp_path, change, words):
     datasets = {name: values for name, values in (datasets | change).items() if values is not None}
     if "stress/matrix" not in datasets:
         datasets = {name: values for name, values in datasets.items() if "stress" not in name}
-    write_model(tmp_path / "model.h5", datasets)
+    write_parts(tmp_path / "model.h5", datasets)
     done = run(tmp_path, with_model(case), status=3)
     assert words in done.stderr
 
 
 def test_natural_frequencies_have_none(tmp_path):
     datasets, case = structure(1, 2, 1)
-    write_model(tmp_path / "model.h5", datasets)
+    write_parts(tmp_path / "model.h5", datasets)
     del case["stress"]
     run(tmp_path, with_model(case | {"case": {"analysis": "modes"}}))
     with h5py.File(tmp_path / "case.h5") as file:
@@ -220,6 +204,6 @@ def test_natural_frequencies_have_none(tmp_path):
 ])
 def test_wrong_cases_are_refused(tmp_path, groups, words):
     datasets, case = structure(1, 2, 1)
-    write_model(tmp_path / "model.h5", datasets)
+    write_parts(tmp_path / "model.h5", datasets)
     done = run(tmp_path, with_model(case | groups), status=3)
     assert words in done.stderr

@@ -2,18 +2,37 @@
 import subprocess
 
 import h5py
+import numpy as np
 from limits import limit
 from project import PATIENT, PROGRAM
 
 from fretwear._namelist import literal
 from fretwear._namelist import write_namelist as namelist_text
 
-__all__ = ["literal", "merged", "read", "run", "write_namelist"]
+__all__ = ["literal", "merged", "read", "run", "with_model", "write_namelist", "write_parts"]
 
 
 def write_namelist(path, groups):
     """Write {group: {key: value}} as a namelist."""
     path.write_text(namelist_text(groups))
+
+
+def write_parts(path, datasets):
+    """Write a model file of {dataset: values}; `group@name` is an attribute."""
+    with h5py.File(path, "w") as file:
+        file.attrs["format"], file.attrs["format_version"] = "fretwear-model", 1
+        for name, values in datasets.items():
+            group, _, attribute = name.partition("@")
+            if attribute:
+                file.require_group(group or "/").attrs[attribute] = values
+            else:
+                file[name] = np.array(values)
+
+
+def with_model(groups):
+    """The same with model.h5 beside it."""
+    return {group: dict(keys) for group, keys in groups.items()} | {
+        "model": {"source": "hdf5", "file": "model.h5"} | groups.get("model", {})}
 
 
 def merged(groups, changes):

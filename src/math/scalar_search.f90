@@ -1,5 +1,5 @@
 !> A root and a largest value of a function of one variable, which may fail.
-module fw_campbell_search
+module fw_scalar_search
    use fw_error, only: error_type
    use fw_kinds, only: wp
    implicit none (type, external)
@@ -152,4 +152,4 @@ contains
       place = x
    end subroutine find_largest
 
-end module fw_campbell_search
+end module fw_scalar_search
