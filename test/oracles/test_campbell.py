@@ -150,3 +150,99 @@ def test_what_does_not_go_together_is_refused(tmp_path, change, words):
         case[group] = {**case.get(group, {}), **keys}
     done = run(tmp_path, case, status=3)
     assert words in done.stderr
+
+
+def random_sector(seed):
+    """A sector with stiffening and Coriolis forces, its loads, and pairs within it."""
+    random = np.random.default_rng(seed)
+    n_sectors, n = int(random.integers(2, 10)), int(random.integers(4, 9))
+    parts = random.normal(size=(2, n, n))
+    whirl = 0.3 * random.normal(size=(n, n))
+    n_pairs = int(random.integers(0, 3))
+    sides = np.zeros((n_pairs, 3), np.int32)
+    # Neither on the interface nor twice on a dof.
+    sides[:, 0] = 1 + random.permutation(np.arange(1, n - 1))[:n_pairs]
+    datasets = {
+        "mass": np.eye(n) + 0.05 * parts[0] @ parts[0].T, "coriolis": whirl - whirl.T,
+        "stiffness": 2.0 * np.eye(n) + 0.3 * parts[1] @ parts[1].T, "damping": 0.02 * np.eye(n),
+        "stiffness_rotation": np.diag(random.uniform(0.0, 0.3, n)),
+        "load/cosine": random.normal(size=n), "load/sine": random.normal(size=n),
+        "cyclic@n_sectors": n_sectors, "cyclic/left": np.array([1], np.int32),
+        "cyclic/right": np.array([n], np.int32)}
+    if n_pairs:
+        datasets |= {
+            "contact/side_1": sides, "contact/side_2": np.zeros_like(sides),
+            "contact/mu": np.full(n_pairs, 0.3),
+            "contact/normal_load": random.uniform(0.1, 1.0, n_pairs),
+            "contact/normal_load_rotation": random.uniform(-0.3, 1.0, n_pairs),
+            "contact/tangential_stiffness": random.uniform(0.5, 2.0, n_pairs)}
+    return datasets, random
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_order_lines_are_points_of_their_speeds(tmp_path, seed):
+    datasets, random = random_sector(seed)
+    n_sectors, n_pairs = datasets["cyclic@n_sectors"], len(datasets.get("contact/mu", []))
+    write_parts(tmp_path / "model.h5", datasets)
+    order = int(random.choice([e for e in range(-n_sectors, 2 * n_sectors + 1) if e]))
+    omega = random.uniform(0.8, 2.0, 3)
+    case = with_model({"cyclic": {"engine_order": order}, "harmonics": {"n_harmonics": 3},
+                       "solver": {"tolerance": 1e-12}})
+    if n_pairs:
+        case["contact"] = {"law": "penalty"}
+    run(tmp_path, {**case, "sweep": {"values": omega.tolist(), "speed_order": abs(order)}})
+    with h5py.File(tmp_path / "case.h5") as file:
+        rows = file["coefficients"][()]
+    for k, w in enumerate(omega):
+        run(tmp_path, {**case, "case": {"analysis": "point"}, "sweep": {"start": w},
+                       "model": {**case["model"], "rotation_speed": w / abs(order)}})
+        with h5py.File(tmp_path / "case.h5") as file:
+            point = file["coefficients"][0]
+        # Two solutions to 1e-12 of the load, times the condition of the structures.
+        assert np.abs(rows[k] - point).max() <= 1e-9 * np.abs(point).max()
+
+
+def frequencies(datasets, diameter, speed):
+    """Undamped and damped alike: Im of the roots of the tied sector, ascending, by NumPy alone."""
+    n = len(datasets["mass"])
+    tie = np.eye(n, dtype=complex)[:, :-1]
+    tie[-1, 0] = np.exp(-2j * np.pi * diameter / datasets["cyclic@n_sectors"])
+    stiffness = datasets["stiffness"] + speed**2 * datasets["stiffness_rotation"]
+    damping = datasets["damping"] + speed * datasets["coriolis"]
+    mass, stiffness, damping = (tie.conj().T @ a @ tie
+                                for a in (datasets["mass"], stiffness, damping))
+    roots = np.linalg.eigvals(np.block([
+        [np.zeros_like(mass), np.eye(n - 1)],
+        [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])).imag
+    return np.sort(roots[roots > 0.0])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_crossings_by_other_eigenvalues(tmp_path, seed):
+    datasets, random = random_sector(100 + seed)
+    n_sectors = datasets["cyclic@n_sectors"]
+    datasets = {name: part for name, part in datasets.items() if "contact" not in name}
+    write_parts(tmp_path / "model.h5", datasets)
+    orders = random.choice([e for e in range(-n_sectors, 2 * n_sectors + 1) if e], 2, replace=False)
+    ends, n_speeds = (0.05, 2.0), 30
+    run(tmp_path, with_model({
+        "case": {"analysis": "campbell"}, "harmonics": {"n_harmonics": 1}, "cyclic": {"n_modes": 3},
+        "campbell": {"start": ends[0], "end": ends[1], "n_speeds": n_speeds,
+                     "orders": orders.tolist(), "peaks": False}}))
+    with h5py.File(tmp_path / "case.h5") as file:
+        found = np.column_stack([file[f"campbell/crossing/{name}"][()]
+                                 for name in ("order", "mode", "speed")])
+    wanted = []
+    for order in orders:
+        speeds = np.linspace(*ends, n_speeds)
+        above = np.array([frequencies(datasets, order, s)[:3] - abs(order) * s for s in speeds])
+        for mode in range(3):
+            changes = np.flatnonzero(above[:-1, mode] * above[1:, mode] < 0.0)
+            wanted += [(order, mode + 1, speeds[k], speeds[k + 1]) for k in changes]
+    assert len(found) == len(wanted)
+    for (order, mode, speed), (e, m, low, high) in zip(found, wanted, strict=True):
+        assert (order, mode) == (e, m)
+        assert low <= speed <= high
+        omega = frequencies(datasets, e, speed)[m - 1]
+        # 1e-12 of the search, and round-off of two eigensolvers.
+        assert abs(omega - abs(e) * speed) <= 1e-10 * omega
