@@ -26,6 +26,7 @@ module fw_body
    contains
       procedure :: has_joint
       procedure :: is_nonlinear
+      procedure :: stand_at
    end type body_type
 
 contains
@@ -36,6 +37,19 @@ contains
 
       has_joint = self%contact%n_pairs + self%springs%n_springs + self%elements%n_elements() > 0
    end function has_joint
+
+   !> The same at the rotation speed that follows a frequency [rad/s]; none follows any more.
+   subroutine stand_at(self, omega, body)
+      class(body_type), intent(in) :: self
+      real(wp), intent(in) :: omega
+      type(body_type), intent(out) :: body
+
+      body%contact = self%contact
+      body%springs = self%springs
+      body%elements = self%elements
+      body%model = self%model%at_frequency(omega)
+      if (allocated(body%model%cyclic%speed)) deallocate (body%model%cyclic%speed)
+   end subroutine stand_at
 
    !> Whether forces of these are not in proportion to the motion.
    pure logical function is_nonlinear(self)

@@ -144,10 +144,7 @@ contains
 
       if (.not. case%model%cyclic%is_alone) return
       range = case%sweep%range()
-      body%contact = case%contact
-      body%springs = case%springs
-      body%model = case%model%at_frequency(range(2))
-      if (allocated(body%model%cyclic%speed)) deallocate (body%model%cyclic%speed)
+      call case%stand_at(range(2), body)
       call find_sector_modes(body, 1, none_held, all_of_them, modes)
       do i = 1, size(modes)
          if (modes(i)%width >= -least*modes(i)%omega) cycle

@@ -41,6 +41,8 @@ module fw_run_campbell
    type :: line_type
       integer :: order = 0, nodal_diameter = 0
       class(case_type), allocatable :: case
+   contains
+      procedure :: turn
    end type line_type
 
    !> How far a mode of the nodal diameter of an order lies above the order, over the speed.
@@ -164,17 +166,13 @@ contains
       text = adjustl(text)
    end function full_number
 
-   !> What vibrates, at a rotation speed.
-   subroutine turn(line, speed, body)
-      type(line_type), intent(in) :: line
-      !> [rad/s]
+   !> What vibrates at a rotation speed [rad/s].
+   subroutine turn(self, speed, body)
+      class(line_type), intent(in) :: self
       real(wp), intent(in) :: speed
-      !> With the matrices at that speed, and none that follow it.
       type(body_type), intent(out) :: body
 
-      body = line%case%body_type
-      body%model = line%case%model%at_frequency(abs(line%order)*speed)
-      if (allocated(body%model%cyclic%speed)) deallocate (body%model%cyclic%speed)
+      call self%case%stand_at(abs(self%order)*speed, body)
    end subroutine turn
 
    !> Of all nodal diameters at all speeds.
@@ -193,7 +191,7 @@ contains
                        [(real(i, wp)/(options%n_speeds - 1), i=0, options%n_speeds - 1)]
          n_modes = min(case%model%cyclic%n_modes, case%model%n_dof)
          do i = 1, options%n_speeds
-            call turn(self%line(1), group%speed(i), body)
+            call self%line(1)%turn(group%speed(i), body)
             ! Without speed nothing whirls, and a nodal diameter stands for both ways.
             if (i == 1) group%nodal_diameter = diameters_of(self, group%speed(options%n_speeds))
             call find_natural_modes(body, n_modes, modes, error, &
@@ -218,7 +216,7 @@ contains
       type(body_type) :: body
       integer :: k
 
-      call turn(self%line(1), speed, body)
+      call self%line(1)%turn(speed, body)
       associate (cyclic => body%model%cyclic)
          if (cyclic%splits_waves()) then
             list = [(k, k=-(cyclic%n_sectors - 1)/2, cyclic%n_sectors/2)]
@@ -321,7 +319,7 @@ contains
       integer :: k
 
       value = 0.0_wp
-      call turn(self%line, x, body)
+      call self%line%turn(x, body)
       k = self%line%nodal_diameter
       if (.not. body%model%cyclic%splits_waves()) k = abs(k)
       call find_natural_modes(body, self%mode, modes, error, [k])
@@ -346,7 +344,7 @@ contains
       integer :: k
 
       omega = abs(line%order)*crossing%speed
-      call turn(line, crossing%speed, body)
+      call line%turn(crossing%speed, body)
       call find_sector_modes(body, 1, 1, omega*[1.0_wp - near, 1.0_wp + near], modes)
       crossing%damping_ratio = ieee_value(1.0_wp, ieee_quiet_nan)
       if (size(modes) == 0) return
