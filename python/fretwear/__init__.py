@@ -60,9 +60,10 @@ from .model import ContactPairs, Model, Spring
 from .result import Result
 from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
+from .user_law import Law
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
+           "FretwearError", "InputError", "Law", "Model", "NodalDiameter", "OutputError", "Point",
            "Polynomial", "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring", "Steps",
            "__version__", "calibrate", "frf", "mode", "optimise", "resonance", "run", "wear"]
 

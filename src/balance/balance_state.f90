@@ -689,6 +689,10 @@ contains
                call entry%law%evaluate_free(self%problem%fourier, work)
                call self%problem%incidence%scatter(entry%free_rows, m, nc, -1.0_wp, work%force, &
                                                    self%balance)
+               ! The law keeps what it has to say of that (fw_law_check).
+               if (work%failed > 0 .and. associated(self%interrupt)) then
+                  self%interrupt%stop_requested = .true.
+               end if
             end if
             if (entry%law%prediction%takes_balance) then
                call add_balance(self, entry, work%prediction)

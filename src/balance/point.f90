@@ -35,6 +35,12 @@ module fw_point
       real(wp), allocatable :: values(:)
    end type point_sensitivity
 
+   !> Of the elements of a kind that is neither pairs nor springs: Fourier coefficients of the
+   !> forces (n_in, n_elements, 2H+1), and the work per cycle that they take (n_elements).
+   type :: point_elements
+      real(wp), allocatable :: force(:, :, :), work(:)
+   end type point_elements
+
    type :: point_type
       !> Angular frequency of the excitation [rad/s].
       real(wp) :: omega = 0.0_wp
@@ -81,6 +87,8 @@ module fw_point
       real(wp), allocatable :: fraction(:, :)
       !> Friction energy per cycle (n_pairs) [force * length].
       real(wp), allocatable :: dissipation(:)
+      !> Of the other elements, by kind.
+      type(point_elements), allocatable :: elements(:)
       !> Of a nonlinear mode: self-excitation [1/s], modal amplitude [length mass**(1/2)], and the
       !> amplitude of the first harmonic of what is observed, not allocated elsewhere (n_observed).
       real(wp) :: self_excitation = 0.0_wp, modal_amplitude = 0.0_wp

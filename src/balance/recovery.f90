@@ -2,6 +2,7 @@
 !> contact forces, states and friction energy.
 module fw_recovery
    use fw_kinds, only: wp, pi
+   use fw_element_recovery, only: recover_elements
    use fw_fourier, only: coefficient_count, to_complex
    use fw_balance_state, only: balance_state
    use fw_point, only: point_type
@@ -46,6 +47,7 @@ contains
       if (i > system%problem%fourier%n_time) point%instants_wanted = i
       if (with_contact .and. system%problem%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
+      if (with_contact) call recover_elements(system, x, n_harmonics, point)
    end subroutine recover_point
 
    !> Observed quantities where the system stands, complex amplitudes (n_observed, n_retained).

@@ -8,6 +8,7 @@ module fw_run
    use fw_combinations, only: check_combinations
    use fw_error, only: error_type
    use fw_frequency_response, only: response_analysis
+   use fw_law_check, only: check_user_laws, clear_reports, raise_of_laws
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
@@ -105,7 +106,9 @@ contains
       call threads%enter(threads_for(case))
       if (analyses(case%analysis)%has_points) call remark_input(case, run%summary%remarks)
       call new_analysis(case, work)
-      call work%start(case, run, error)
+      call clear_reports(case)
+      call check_user_laws(case, error)
+      if (.not. allocated(error)) call work%start(case, run, error)
       more = associated(run%source) .and. .not. allocated(error)
       do while (more)
          call run%source%next(case, observer, point, more, error)
@@ -170,6 +173,7 @@ contains
       elapsed = real(clock - start, wp)/real(rate, wp)
       outcome%status = run%state%status()
       outcome%out_of_time = run%observer%run_out
+      call raise_of_laws(case, error)
       call run%summary%remark_instants()
       if (.not. allocated(error)) call run%writer%add(run%summary%remarks, error)
       if (allocated(error) .and. run%state%n_points == 0) then

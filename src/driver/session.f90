@@ -9,6 +9,7 @@ module fw_session
    use fw_error, only: error_type, fatal_error, status_usage
    use fw_harmonics_options, only: harmonics_options
    use fw_kinds, only: wp
+   use fw_law_check, only: check_user_laws, clear_reports, raise_of_laws
    use fw_memory_model, only: memory_model_type
    use fw_namelist, only: parse_override
    use fw_namelist_data, only: entry_type
@@ -28,6 +29,7 @@ module fw_session
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_threads, only: thread_scope
+   use fw_user_element, only: user_element, user_law_type
    implicit none (type, external)
    private
 
@@ -49,6 +51,8 @@ module fw_session
       character(:), allocatable, private :: text, path
       type(string_type), allocatable, private :: keys(:)
       type(memory_model_type), allocatable, private :: model
+      !> Laws that the program has added.
+      type(user_element), allocatable, private :: laws(:)
       !> The case agrees with what was given.
       logical, private :: is_read = .false.
       !> Only between `start` and the next change.
@@ -63,6 +67,8 @@ module fw_session
       generic :: put => put_reals, put_integers, put_texts
       procedure :: observe
       procedure :: observe_all
+      procedure :: add_law
+      procedure :: add_element
       procedure :: prepare
       procedure :: is_ready
       procedure :: check
@@ -208,6 +214,45 @@ contains
       call forget(self)
    end subroutine observe
 
+   !> Add an element whose forces an object of the program gives; see fw_user_element. The object
+   !> has to live as long as the session.
+   subroutine add_law(self, name, law, side_1, side_2, parameters, odd, difference)
+      class(session_type), intent(inout) :: self
+      !> For messages.
+      character(*), intent(in) :: name
+      class(user_law_type), intent(inout), target :: law
+      !> Signed dofs of its inputs, and those on the other side (default: the ground) (n_in).
+      integer, intent(in) :: side_1(:)
+      integer, intent(in), optional :: side_2(:)
+      !> Constants that are handed on (default: none).
+      real(wp), intent(in), optional :: parameters(:)
+      !> Opposite motions have opposite forces; slopes are not given, but differences (default: no).
+      logical, intent(in), optional :: odd, difference
+      type(user_element) :: element
+
+      element%name = name
+      element%n_in = size(side_1)
+      element%side_1 = side_1
+      element%side_2 = 0*side_1
+      if (present(side_2)) element%side_2 = side_2
+      allocate (element%parameters(0))
+      if (present(parameters)) element%parameters = parameters
+      if (present(odd)) element%is_odd = odd
+      if (present(difference)) element%has_derivative = .not. difference
+      element%object => law
+      call self%add_element(element)
+   end subroutine add_law
+
+   !> Add an element with a law of its own, ready made.
+   subroutine add_element(self, element)
+      class(session_type), intent(inout) :: self
+      type(user_element), intent(in) :: element
+
+      if (.not. allocated(self%laws)) allocate (self%laws(0))
+      self%laws = [self%laws, element]
+      call forget(self)
+   end subroutine add_element
+
    !> Bring `case` up to date with what was given, which forgets the points of the one before;
    !> does nothing where it is so already.
    subroutine prepare(self, error)
@@ -228,6 +273,7 @@ contains
       input%overrides = self%keys
       input%text = self%text
       input%origin = trim(self%origin)
+      if (allocated(self%laws)) input%laws = self%laws
       ! Damping and checks of a model must not depend on the threads of the BLAS.
       call threads%enter(0)
       if (allocated(self%model)) then
@@ -289,7 +335,8 @@ contains
       call self%points%clear()
       allocate (self%strategy)
       call threads%enter(threads_for(self%case))
-      call self%strategy%start(self%case, error)
+      call check_user_laws(self%case, error)
+      if (.not. allocated(error)) call self%strategy%start(self%case, error)
       call threads%leave()
       if (allocated(error)) call forget_system(self)
    end subroutine start
@@ -342,12 +389,14 @@ contains
       end if
       if (allocated(error)) return
       observer%stop_requested = .false.
+      call clear_reports(self%case)
       recorder%list => self%points
       recorder%observer => observer
       call threads%enter(threads_for(self%case))
       call self%strategy%solve_in_time(self%case, new_request(self%case, omega, observer), point, &
                                        error)
       call threads%leave()
+      call raise_of_laws(self%case, error)
       if (allocated(error)) return
       if (allocated(point%note)) call recorder%on_message(point%note)
       if (allocated(self%strategy%note)) call recorder%on_message(self%strategy%note)
@@ -434,6 +483,7 @@ contains
       if (allocated(other%path)) self%path = other%path
       if (allocated(other%keys)) self%keys = other%keys
       if (allocated(other%model)) self%model = other%model
+      if (allocated(other%laws)) self%laws = other%laws
       self%origin = other%origin
       self%is_read = other%is_read
    end subroutine copy

@@ -9,7 +9,7 @@
 module fw_instant_law
    use fw_force_law, only: force_law, force_workspace, law_room, pair_mixed
    use fw_fourier, only: fourier_type
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_lapack, only: dgemm
    use fw_wave_sums, only: wave_sums, wave_table
    implicit none (type, external)
@@ -20,9 +20,16 @@ module fw_instant_law
    !> Instants of one product: enough for the speed of dgemm, few enough for the cache.
    integer, parameter :: block = 64
 
+   !> Room for the same numbers one behind the other, where a law asks for it.
+   type :: motion_scratch
+      real(wp), allocatable :: u(:), v(:), force(:), other_force(:), by_u(:), by_v(:)
+   end type motion_scratch
+
    !> One element over the period: what it is asked, and what it answers. Inputs stand innermost.
    type :: element_motion
       integer :: element = 0, n_time = 0
+      !> omega t at the instants.
+      real(wp), allocatable :: tau(:)
       !> [rad/s]
       real(wp) :: omega = 0.0_wp
       !> Displacements and rates by time (n_in, n_time).
@@ -33,6 +40,10 @@ module fw_instant_law
       !> (j, i, instant). What is not set is zero.
       logical :: wants_slopes = .false.
       real(wp), allocatable :: by_u(:, :, :), by_v(:, :, :)
+      !> Other than 0 where there is no force, and the instant where that shows: above 0 the run is
+      !> to end.
+      integer :: status = 0, instant = 1
+      type(motion_scratch), allocatable :: scratch
    end type element_motion
 
    type, extends(law_room) :: instant_room
@@ -53,6 +64,7 @@ module fw_instant_law
       logical :: takes_rates = .false.
       !> Slopes by displacements are those of a potential: df_i/du_j = df_j/du_i.
       logical :: has_potential = .false.
+      logical :: needs_scratch = .false.
    contains
       procedure :: take_inputs
       procedure :: reserve
@@ -103,7 +115,7 @@ contains
       allocate (room)
       n = self%n_components*fourier%n_coefficients
       allocate (work%jacobian(n, n, self%n_elements), source=0.0_wp)
-      call reserve_motion(self%n_in, fourier%n_time, room%motion)
+      call reserve_motion(self%n_in, fourier%n_time, self%needs_scratch, room%motion)
       allocate (room%slope(fourier%n_time))
       if (self%takes_rates) then
          allocate (room%rate, source=work%prediction)
@@ -120,10 +132,21 @@ contains
       call move_alloc(room, work%room)
    end subroutine reserve
 
-   pure subroutine reserve_motion(n_in, n_time, motion)
+   pure subroutine reserve_motion(n_in, n_time, with_scratch, motion)
       integer, intent(in) :: n_in, n_time
+      logical, intent(in) :: with_scratch
       type(element_motion), intent(out) :: motion
+      integer :: k, n
 
+      motion%tau = [(2.0_wp*pi*real(k, wp)/real(n_time, wp), k=0, n_time - 1)]
+      if (with_scratch) then
+         n = n_in*n_time
+         allocate (motion%scratch)
+         associate (s => motion%scratch)
+            allocate (s%u(n), s%v(n), s%force(n), s%other_force(n), source=0.0_wp)
+            allocate (s%by_u(n_in*n), s%by_v(n_in*n), source=0.0_wp)
+         end associate
+      end if
       motion%n_time = n_time
       allocate (motion%u(n_in, n_time), motion%v(n_in, n_time), motion%force(n_in, n_time), &
                 source=0.0_wp)
@@ -137,6 +160,7 @@ contains
       integer :: c, i, k
 
       if (self%n_elements == 0) return
+      work%failed = 0
       call fourier%to_time(self%n_elements*self%n_components, work%prediction, &
                            work%prediction_time, work%fft)
       select type (room => work%room)
@@ -152,6 +176,7 @@ contains
          do i = 1, self%n_elements
             call self%take_motion(work, i, room%motion)
             call self%act(room%motion)
+            if (room%motion%status /= 0) call note_refusal(self%n_in, room%motion, work)
             do k = 1, fourier%n_time
                do c = 1, self%n_in
                   work%force_time(i, c, k) = room%motion%force(c, k)
@@ -164,6 +189,27 @@ contains
       ! Every element has a block in the derivative.
       work%state = pair_mixed
    end subroutine evaluate
+
+   !> The motion that an element has no force for.
+   pure subroutine note_refusal(n_in, motion, work)
+      integer, intent(in) :: n_in
+      type(element_motion), intent(inout) :: motion
+      type(force_workspace), intent(inout) :: work
+      integer :: n
+
+      work%failed = max(work%failed, motion%status)
+      if (work%failed == 0) work%failed = motion%status
+      associate (r => work%refusal)
+         n = min(n_in, size(r%u))
+         r%element = motion%element
+         r%instant = motion%instant
+         r%status = motion%status
+         r%omega = motion%omega
+         r%u(:n) = motion%u(:n, motion%instant)
+         r%v(:n) = motion%v(:n, motion%instant)
+      end associate
+      motion%status = 0
+   end subroutine note_refusal
 
    !> Inputs of an element at the instants of the last evaluation.
    subroutine take_motion(self, work, element, motion)
@@ -207,6 +253,7 @@ contains
             room%motion%by_u = 0.0_wp
             room%motion%by_v = 0.0_wp
             call self%act(room%motion)
+            if (room%motion%status /= 0) call note_refusal(self%n_in, room%motion, work)
             do out = 1, self%n_in
                do in = 1, self%n_in
                   if (self%has_potential .and. .not. self%takes_rates .and. in < out) then
@@ -268,6 +315,7 @@ contains
             room%motion%by_u = 0.0_wp
             room%motion%by_v = 0.0_wp
             call self%act(room%motion)
+            room%motion%status = 0
             do k = 1, fourier%n_time
                force(:, k) = matmul(room%motion%v(:, k), room%motion%by_v(:, :, k))/work%rate
             end do
@@ -331,7 +379,7 @@ contains
       type(element_motion) :: motion
 
       slope = 0.0_wp
-      call reserve_motion(self%n_in, 1, motion)
+      call reserve_motion(self%n_in, 1, self%needs_scratch, motion)
       motion%element = element
       motion%wants_slopes = .true.
       motion%u(:, 1) = y(:self%n_in)

@@ -6,6 +6,7 @@
 !> A new quantity is one line in `point_quantities` and its case in `values_of`.
 module fw_point_quantities
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+   use fw_elements, only: element_kind
    use fw_case, only: case_type
    use fw_hdf5, only: growing_integer, growing_logical, growing_real
    use fw_kinds, only: wp
@@ -15,7 +16,7 @@ module fw_point_quantities
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
       follows_parameter, goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
-      scales_load, shows_contact, wears
+      scales_load, shows_contact, shows_user, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -121,6 +122,10 @@ contains
                'share of the period in stick, slip, open', shows_contact)
       call add('contact/dissipation', r, '<energy>', 'point pair', 'friction energy per cycle', &
                shows_contact)
+      call add('user/force', r, '', 'point coefficient law input', &
+               'Fourier coefficients of the forces of user laws', shows_user)
+      call add('user/work', r, '', 'point law', &
+               'work per cycle that user laws take', shows_user)
       call add('history/observed', r, '<length>', 'point instant observed', &
                'observed quantities over one period', always)
       call add('history/force', r, '<force>', 'point instant pair direction', &
@@ -246,6 +251,10 @@ contains
          n = case%contact%n_pairs
       case ('spring')
          n = case%springs%n_springs
+      case ('law')
+         n = case%elements%extent_of('user', 2)
+      case ('input')
+         n = case%elements%extent_of('user', 1)
       case ('patch')
          n = count_patches(case%contact)
       case ('direction', 'state')
@@ -367,6 +376,10 @@ contains
          if (allocated(point%fraction)) values = reshape(point%fraction, [size(point%fraction)])
       case ('contact/dissipation')
          if (allocated(point%dissipation)) values = point%dissipation
+      case ('user/force')
+         call forces_of('user', point, values)
+      case ('user/work')
+         call work_of('user', point, values)
       case ('history/observed')
          call by_rows(point%history, values)
       case ('history/force')
@@ -398,6 +411,30 @@ contains
       case default ! derivatives, which find_sensitivity knows
       end select
    end subroutine values_of
+
+   !> Forces of the elements of a group.
+   subroutine forces_of(group, point, values)
+      character(*), intent(in) :: group
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (.not. allocated(point%elements)) return
+      associate (found => point%elements(element_kind(group)))
+         if (allocated(found%force)) values = reshape(found%force, [size(found%force)])
+      end associate
+   end subroutine forces_of
+
+   !> Work per cycle that the elements of a group take.
+   subroutine work_of(group, point, values)
+      character(*), intent(in) :: group
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (.not. allocated(point%elements)) return
+      associate (found => point%elements(element_kind(group)))
+         if (allocated(found%work)) values = found%work
+      end associate
+   end subroutine work_of
 
    !> The elements of a matrix with the second index running fastest; nothing of none.
    pure subroutine by_rows(array, values)

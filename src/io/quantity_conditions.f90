@@ -9,7 +9,7 @@ module fw_quantity_conditions
 
    public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
              goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
-             scales_load, shows_contact, wears
+             scales_load, shows_contact, shows_user, wears
 
 contains
 
@@ -27,6 +27,13 @@ contains
 
       is_response = analyses(case%analysis)%is_response
    end function is_response
+
+   !> Elements with laws of a user, which are shown as contact is.
+   pure logical function shows_user(case)
+      type(case_type), intent(in) :: case
+
+      shows_user = case%output%contact .and. case%elements%extent_of('user', 2) > 0
+   end function shows_user
 
    pure logical function is_mode(case)
       type(case_type), intent(in) :: case

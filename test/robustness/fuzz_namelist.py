@@ -16,6 +16,8 @@ KEYS = {
                 "mu_dynamic", "weakening_speed", "weakening_exponent", "mu_viscous", "speed_1",
                 "speed_2", "penalty_scale", "memory", "worn", "worn_step"],
     "polynomial": ["n_terms", "of", "factors", "coefficient", "dof"],
+    "user": ["n_elements", "library", "symbol", "n_in", "side_1", "side_2", "n_parameters",
+             "parameters", "derivative", "odd", "thread_safe", "check", "check_tolerance"],
     "spring": ["n_springs", "side_1", "side_2", "sector_2", "coefficient", "power"],
     "load": ["static", "cosine", "sine", "n_terms", "term_dof", "term_harmonic", "term_order",
              "term_amplitude", "term_phase", "term_power", "static_scale", "harmonic_scale"],

@@ -1,0 +1,42 @@
+/* Two laws for &user: cc -O2 -shared -fPIC -I ../../include -o laws.so laws.c -lm */
+#include <math.h>
+
+#include "fretwear.h"
+
+const int fw_law_interface = 1;
+
+/* A cubic spring, f = c u^3: one constant. */
+int cubic(void *user, const fw_law_call *call, double *force, double *du, double *dv)
+{
+   const double c = call->parameters[0];
+   (void)user;
+   (void)dv;
+   for (int k = 0; k < call->n_time; k++) {
+      const double u = call->u[k];
+      force[k] = c * u * u * u;
+      if (call->wants_derivative)
+         du[k] = 3.0 * c * u * u;
+   }
+   return 0;
+}
+
+/* Smooth friction with a load that grows with a second displacement, f_1 = mu (N + k u_2) tanh(v_1/v_0),
+   f_2 = 0: two inputs, four constants mu, N, k, v_0. */
+int loaded_friction(void *user, const fw_law_call *call, double *force, double *du, double *dv)
+{
+   const double *p = call->parameters;
+   (void)user;
+   if (call->n_in != 2 || call->n_parameters != 4)
+      return 1; /* ends the run */
+   for (int k = 0; k < call->n_time; k++) {
+      const double u = call->u[2 * k + 1], v = call->v[2 * k];
+      const double t = tanh(v / p[3]), load = p[1] + p[2] * u;
+      force[2 * k] = p[0] * load * t;
+      if (!call->wants_derivative)
+         continue;
+      /* Force 0 by input 1, and by rate 0: [(k n_in + force) n_in + input]. */
+      du[4 * k + 1] = p[0] * p[2] * t;
+      dv[4 * k] = p[0] * load * (1.0 - t * t) / p[3];
+   }
+   return 0;
+}
