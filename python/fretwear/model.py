@@ -20,6 +20,7 @@ from .errors import InputError, NotBuiltError, OutputError
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
 from .stress import OF_PICTURES, Stress, read_stress
+from .user_law import Law
 
 __all__ = ["ContactPairs", "Model", "Spring"]
 
@@ -184,6 +185,8 @@ class Model:
         Nonlinear springs.
     elements : iterable of Elements, optional
         Other elements, such as a `Polynomial`: one of each kind.
+    laws : iterable of Law, optional
+        Elements whose forces are functions of your own.
     static, cosine, sine : (n_dof,), optional
         Loads [force].
     stiffness_rotation : (n_dof, n_dof), optional
@@ -228,7 +231,7 @@ class Model:
 
     def __init__(self, M: ArrayLike | None, C: ArrayLike | None, K: ArrayLike | None, *,
                  contact: ContactPairs | None = None, springs: Iterable[Spring] = (),
-                 elements: Iterable[Elements] = (),
+                 elements: Iterable[Elements] = (), laws: Iterable[Law] = (),
                  static: ArrayLike | None = None, cosine: ArrayLike | None = None,
                  sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
                  static_rotation: ArrayLike | None = None, sectors: Sectors | None = None,
@@ -284,6 +287,11 @@ class Model:
             dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
             array(f"springs[{number}].coefficient", spring.coefficient, ())
         self.elements = checked_elements(elements, n)
+        laws = tuple(laws)
+        for number, law in enumerate(laws):
+            if not isinstance(law, Law):
+                raise InputError(f"laws[{number}]: is a {type(law).__name__}, must be a Law")
+        self.laws = tuple(law.checked(number, n) for number, law in enumerate(laws))
         self.sectors = None if sectors is None else sectors.checked(n)
         if stress is not None and not isinstance(stress, Stress):
             raise InputError(f"stress: is a {type(stress).__name__}, must be Stress")
@@ -471,6 +479,9 @@ class Model:
         OutputError
             The file cannot be written.
         """
+        if self.laws:
+            raise InputError("laws: are functions, which no model file holds; make a library of "
+                             "them (group &user), or leave them out")
         pairs = {f"contact/{name}": values for name in _IN_NAMELIST
                  if (values := getattr(self.contact, name, None)) is not None}
         try:
@@ -548,6 +559,8 @@ class Model:
         for one in self.elements:
             for name, word in one.attributes().items():
                 session.put_texts(f"{one.group}/{name}", [word])
+        for law in self.laws:
+            session.add_law(law)
         for name in ("title", "unit_system"):
             if getattr(self, name):
                 session.put_texts(name, [getattr(self, name)])

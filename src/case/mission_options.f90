@@ -6,6 +6,7 @@ module fw_mission_options
    use fw_kinds, only: wp
    use fw_raw_model, only: raw_model
    use fw_text, only: string_type
+   use fw_user_element, only: user_element
    implicit none (type, external)
    private
 
@@ -22,6 +23,8 @@ module fw_mission_options
       !> The model where the calling program gives it.
       type(raw_model), allocatable :: model
       logical :: tries_files = .false.
+      !> Laws that the calling program has added.
+      type(user_element), allocatable :: laws(:)
    end type mission_source
 
    type :: mission_options

@@ -32,6 +32,7 @@ contains
          input%origin = '&mission change('//to_text(number)//')'
          input%tries_files = source%tries_files
          input%is_block = .true.
+         if (allocated(source%laws)) input%laws = source%laws
          call split_change(case%mission%change(number)%text, items)
          do i = 1, size(items)
             call append(input%overrides, items(i)%text)
