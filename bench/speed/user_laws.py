@@ -111,7 +111,7 @@ def measure_user_laws(folder: Path, quick: bool) -> list[UserLaw]:
     for _ in range(1 if quick else RUNS):
         for name, one in ways.items():
             start = time.process_time()
-            found[name] = one.run()
+            found[name] = fw.run(one)
             seconds[name] = min(seconds[name], time.process_time() - start)
     level = found["pairs"].amplitude
     return [UserLaw(name, seconds[name], int(found[name].iterations.sum()),

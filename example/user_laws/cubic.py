@@ -23,5 +23,5 @@ amplitudes = []
 for model in (own, built_in):
     case = fw.Case(model, case={"analysis": "point"}, harmonics={"n_harmonics": 9},
                    sweep={"start": 1.2}, solver={"tolerance": 1e-11})
-    amplitudes.append(float(case.run().amplitude[0, 0]))
+    amplitudes.append(float(fw.run(case).amplitude[0, 0]))
 print("amplitude: own law {:.10f}, built in {:.10f}".format(*amplitudes))

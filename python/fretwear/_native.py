@@ -211,9 +211,7 @@ class Session:
         int
             Status of the library; `text("message")` explains it where the run has failed.
         """
-        status = int(self._core.run_case(self._handle, control, int(in_memory)))
-        self.raise_of_laws()
-        return status
+        return int(self._core.run_case(self._handle, control, int(in_memory)))
 
     def run_piece(self, points: tuple[int, int], lead: int, solved: int,
                   control: NDArray[np.int64]) -> int:
@@ -236,9 +234,7 @@ class Session:
         int
             Status of the library.
         """
-        status = int(self._core.run_piece(self._handle, [*points, lead, solved], control))
-        self.raise_of_laws()
-        return status
+        return int(self._core.run_piece(self._handle, [*points, lead, solved], control))
 
     def start(self) -> None:
         """Prepare for steps from frequency to frequency."""

@@ -113,6 +113,7 @@ def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object]
     with case.open() as session:
         with teller(progress, session) as tell:
             status, interrupted = run_watched(session, tell, is_stopped, in_memory=in_memory)
+            session.raise_of_laws()
         report = (session.text("remarks") + session.text("summary")).splitlines()
         message, path = session.text("message"), session.text("output")
         image = session.image() if in_memory else None

@@ -362,7 +362,7 @@ def test_a_slider_in_python_is_that_in_c(tmp_path, library, derivative):
     law = fw.Law(slider, 1, parameters=[1.2, 0.4], states=[0.0], derivative=derivative, odd=True)
     model = fw.Model([[MASS]], [[DAMPING]], [[STIFFNESS]], laws=[law], cosine=[1.0])
     del case["user"], case["load"], case["model"]
-    in_python = fw.Case(model, **case).run()
+    in_python = fw.run(fw.Case(model, **case))
     assert difference(in_python.coefficients[0], in_c.coefficients[0]) < WITHIN
 
 
@@ -373,4 +373,4 @@ def test_what_a_step_in_python_raises_is_raised_again():
     model = fw.Model([[MASS]], [[DAMPING]], [[STIFFNESS]], cosine=[1.0],
                      laws=[fw.Law(wrong, 1, states=[0.0])])
     with pytest.raises(fw.InputError, match="returned an array of shape"):
-        fw.Case(model, case={"analysis": "point"}, sweep={"start": 1.1}).run()
+        fw.run(fw.Case(model, case={"analysis": "point"}, sweep={"start": 1.1}))
