@@ -310,8 +310,8 @@ def test_parameters_and_several_inputs_in_python():
         return p[0] * np.stack([u[:, 0] * u[:, 1] ** 2, u[:, 0] ** 2 * u[:, 1]], axis=1)
 
     own = solved(model(laws=[fw.Law(law, [1, 2], parameters=[0.7], odd=True)]))
-    terms = fw.Polynomial([[1, 1, 2, 2]], [0.35])
-    other = solved(model(elements=[terms]))
+    terms = {"n_terms": 1, "coefficient": 0.35, "factors": [1, 1, 2, 2, 0, 0, 0, 0]}
+    other = solved(model(), polynomial=terms)
     scale = np.abs(other.coefficients).max()
     assert np.abs(own.coefficients - other.coefficients).max() < WITHIN * scale
 
