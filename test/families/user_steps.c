@@ -9,8 +9,8 @@ const int slider_states = 1, bouc_wen_states = 1, maxwell_states = 2, both_state
 
 #define UNUSED (void)user
 
-/* Slopes come in as zeros: dstate(n, n + 4) by (state, u, v before, u, v after), dforce(1, n + 2) by
-   (state after, u, v after). */
+/* Slopes come in as zeros: dstate(n, n + 4) by (state, u, v before, u, v after), and
+   dforce(1, n + 2) by (state after, u, v after). */
 static double slide(double k, double limit, double x, double u, int *sticks)
 {
    const double trial = k * (u - x);
