@@ -44,6 +44,7 @@ from bench.speed.report import Measurements, write_speed
 from bench.speed.scaling import measure_scaling
 from bench.speed.scaling_report import write_scaling
 from bench.speed.skips import measure_skips, write_skips
+from bench.speed.user_laws import measure_user_laws, write_user_laws
 
 
 @dataclass(frozen=True)
@@ -159,8 +160,9 @@ def skips(job: Job) -> str:
 
 
 def laws(job: Job) -> str:
-    """What pairs of several laws cost."""
-    return write_laws(measure_laws(job.bench))
+    """What pairs of several laws cost, and laws of a user."""
+    own = write_user_laws(measure_user_laws(job.bench.folder, job.bench.quick))
+    return write_laws(measure_laws(job.bench)) + "\n\n" + own
 
 
 PARTS = {"speed": speed, "precision": precision, "events": events, "solvers": solvers,

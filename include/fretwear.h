@@ -129,6 +129,56 @@ int fw_put_integers(fw_handle handle, const char *name, size_t n, const int *val
    n = 0 only the name is given: the rows are those of nodal_diameter/K/observe/matrix. */
 int fw_observe(fw_handle handle, const char *name, size_t n, const double *row);
 
+/* Laws of your own; docs/user_laws.md has a whole example.
+
+   A law gives the forces of one element at all instants of a period: of its n_in displacements u
+   (differences of dofs) and their rates v = du/dt. Arrays are (n_time, n_in), the input running
+   fastest. It returns 0, a negative number where it has no force for this motion (the step is taken
+   back), or a positive one, which ends the run. */
+typedef struct fw_law_call {
+   size_t size;                /* of this struct */
+   int n_time, n_in, n_state, n_parameters;
+   int wants_derivative;       /* 1: fill du and dv, which come in as zeros */
+   double omega;               /* [rad/s] */
+   const double *tau, *u, *v;  /* omega t (n_time); u, v (n_time, n_in) */
+   const double *parameters;   /* (n_parameters) */
+} fw_law_call;
+
+/* force (n_time, n_in), on the side of the stiffness, comes in as zeros; du, dv (n_time, n_in, n_in):
+   force i by u_j and by v_j at [(t*n_in + i)*n_in + j], null where they are not wanted. */
+typedef int (*fw_law_force)(void *user, const fw_law_call *call, double *force, double *du,
+                            double *dv);
+
+/* A law that remembers gives a step, from one instant to the next: call has n_time = 2 with tau, u
+   and v before and after. It fills the state and the forces (n_in) at the end and, where they are
+   wanted, dstate (n_state, n_state + 4 n_in): by (state, u, v before, u, v after), and dforce
+   (n_in, n_state + 2 n_in): by (state after, u, v after), the second index running fastest. */
+typedef int (*fw_law_step)(void *user, const fw_law_call *call, const double *state,
+                           double *state_after, double *force, double *dstate, double *dforce);
+
+enum fw_law_flags {
+   FW_LAW_ODD = 1,           /* opposite motions have opposite forces: you promise it */
+   FW_LAW_THREAD_SAFE = 2,   /* may be called from several threads; else the calling one alone */
+   FW_LAW_NO_DERIVATIVE = 4  /* du and dv are never filled: differences stand for them */
+};
+
+typedef struct fw_law {
+   size_t size;                 /* sizeof(fw_law) */
+   int n_in, n_state, n_parameters;
+   const int *side_1, *side_2;  /* signed dofs (n_in); side_2 null: the ground */
+   const double *parameters, *start;   /* start: states of the unstrained element, null: 0 */
+   unsigned flags;
+   fw_law_force force;
+   fw_law_step step;            /* with states; else force, and null here */
+   void *user;                  /* handed on as it is */
+} fw_law;
+
+/* Add an element with a law to the case; the struct is copied, function and `user` have to live as
+   long as the handle. A library that &user names exports `const int fw_law_interface = 1;`
+   and functions fw_law_force; of a step, beside fw_law_step NAME, `const int NAME_states` and, if
+   it is not 0, `const double NAME_start[]`. */
+int fw_add_law(fw_handle handle, const char *name, const fw_law *law);
+
 /* Callbacks; NULL removes one. `user` is passed on as it is. */
 int fw_on_progress(fw_handle handle, fw_progress_callback callback, void *user);
 int fw_on_message(fw_handle handle, fw_message_callback callback, void *user);
@@ -174,6 +224,7 @@ int fw_count(fw_handle handle, const char *what, int *n);
    (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)
    (n_pairs, 3):          "contact/fraction" of the period in stick, slip and open
    (n_pairs):             "contact/dissipation", energy per cycle
+   (2H+1, laws, n_in):    "user/force" of laws of your own, and (laws): "user/work" per cycle
    "history/observed", "history/force", "history/relative_displacement",
    "floquet/multipliers", "floquet/stable": where the case asks for them.
    "sensitivity/QUANTITY/PARAMETER" ([n_observed][, n_pairs]), "sensitivity/deviation/QUANTITY":

@@ -19,6 +19,8 @@ module fretwear
    use fw_run_state, only: outcome_type
    use fw_read_case, only: read_case, read_case_text
    use fw_run, only: check_case, run_case
+   ! Laws of one's own: extend the abstract type, `session%add_law`.
+   use fw_user_element, only: user_call, user_law_type
    ! Progress, messages and stops: extend the abstract type, or take the silent one.
    use fw_observer, only: observer_type, silent_observer
    ! What is known of a solution point.
@@ -34,6 +36,7 @@ module fretwear
    private
 
    public :: session_type
+   public :: user_call, user_law_type
    public :: case_type, outcome_type, read_case, read_case_text, check_case, run_case
    public :: observer_type, silent_observer, point_type
    public :: error_type, status_ok, status_failure, status_usage, status_input

@@ -10,11 +10,12 @@ module fw_python
    use fw_python_session, only: handle_of, handle_type, new_handle
    use fw_text, only: join, string_type
    use fw_version, only: version
+   use fw_user_element, only: user_element
    implicit none (type, external)
    private
 
    public :: open_session, close_session, library_version
-   public :: new_model, put_reals, put_integers, put_texts, observe
+   public :: new_model, put_reals, put_integers, put_texts, observe, add_law
    public :: give_case, prepare, check_case, run_case, run_piece, copy_session
    public :: start, solve, count_frequencies, frequencies
    public :: count_values, get_values, count_bytes, get_bytes, parse_namelist, unread_parts
@@ -111,6 +112,36 @@ contains
       call handle%session%put(name, list_of(texts), error)
       call handle%conclude(error, status)
    end subroutine put_texts
+
+   !> An element with a law of its own, by the address of its function, of a step where there are
+   !> states; `flags` as in fretwear.h.
+   subroutine add_law(number, name, n_in, side_1, side_2, n_parameters, parameters, n_state, &
+                      start, flags, address, status)
+      integer(i8), intent(in) :: number
+      character(*), intent(in) :: name
+      integer, intent(in) :: n_in, n_parameters, n_state, flags
+      integer, intent(in) :: side_1(n_in), side_2(n_in)
+      real(wp), intent(in) :: parameters(n_parameters), start(n_state)
+      integer(i8), intent(in) :: address
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+      type(user_element) :: element
+
+      handle => handle_of(number)
+      element%name = name
+      element%n_in = n_in
+      element%side_1 = side_1
+      element%side_2 = side_2
+      element%parameters = parameters
+      element%n_state = n_state
+      element%start = start
+      element%is_odd = btest(flags, 0)
+      element%has_derivative = .not. btest(flags, 2)
+      element%function = transfer(address, element%function)
+      call handle%session%add_element(element)
+      call handle%conclude(error, status)
+   end subroutine add_law
 
    !> Observed quantities: names, and a column of factors of the dofs each.
    subroutine observe(number, n, names, n_dof, n_observed, columns, status)

@@ -64,10 +64,11 @@ from .result import Result
 from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
 from .stress import Stress
+from .user_law import Law
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "Damper", "FretwearError", "InputError", "Mistuning", "Model", "NodalDiameter",
-           "OutputError", "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped",
+           "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model",
+           "NodalDiameter", "OutputError", "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped",
            "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf", "mode",
            "optimise", "resonance", "run", "wear"]
 

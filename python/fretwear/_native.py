@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FretwearError, InputError, NotBuiltError, OutputError
+
+if TYPE_CHECKING:
+    from .user_law import BoundLaw
 
 __all__ = ["NOT_CONVERGED", "STOPPED", "Session", "functions", "join_texts", "library_version",
            "namelist_values", "raise_status", "routines", "unread_parts"]
@@ -117,6 +120,7 @@ class Session:
     def __init__(self, other: Session | None = None) -> None:
         """Empty, or with the case of another session, which is not read again."""
         self._core = routines()
+        self._laws: list[BoundLaw] = [] if other is None else list(other._laws)
         self._handle: int | None = (self._core.open_session() if other is None
                                     else self._core.copy_session(other._handle))
 
@@ -134,6 +138,7 @@ class Session:
             self._handle = None
 
     def _checked(self, status: int) -> None:
+        self.raise_of_laws()
         raise_status(status, self.text("message"))
 
     # ------------------------------------------------------------------ what it is told
@@ -157,6 +162,20 @@ class Session:
     def put_texts(self, name: str, texts: Iterable[str]) -> None:
         """Give "title", "unit_system" or "contact/patch"."""
         self._checked(self._core.put_texts(self._handle, name, join_texts(texts)))
+
+    def add_law(self, law: BoundLaw) -> None:
+        """Give an element whose forces a function gives; what it raises is raised by the call."""
+        self._laws.append(law)
+        self._checked(self._core.add_law(self._handle, law.name, law.side_1, law.side_2,
+                                         law.parameters, law.start, law.flags,
+                                         law.address))
+
+    def raise_of_laws(self) -> None:
+        """Raise what a law raised while the library was at work."""
+        for law in self._laws:
+            if law.raised is not None:
+                error, law.raised = law.raised, None
+                raise error
 
     def observe(self, names: Iterable[str], columns: NDArray[np.float64]) -> None:
         """Give observed quantities: names, and a column of factors (n_dof, n_observed)."""

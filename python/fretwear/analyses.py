@@ -121,6 +121,7 @@ def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object]
         with teller(progress, session) as tell:
             status, interrupted = run_watched(
                 lambda control: session.run(control, in_memory=in_memory), tell, is_stopped)
+            session.raise_of_laws()
         report = (session.text("remarks") + session.text("summary")).splitlines()
         message, path = session.text("message"), session.text("output")
         image = session.image() if in_memory else None

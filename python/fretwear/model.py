@@ -21,6 +21,7 @@ from .mistuning import Mistuning, read_mistuning
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
 from .stress import OF_PICTURES, Stress, read_stress
+from .user_law import Law
 
 __all__ = ["ContactPairs", "Model", "Spring"]
 
@@ -189,6 +190,8 @@ class Model:
         Nonlinear springs.
     elements : iterable of Elements, optional
         Other elements, such as a `Polynomial`: one of each kind.
+    laws : iterable of Law, optional
+        Elements whose forces are functions of your own.
     static, cosine, sine : (n_dof,), optional
         Loads [force].
     stiffness_rotation : (n_dof, n_dof), optional
@@ -235,7 +238,7 @@ class Model:
 
     def __init__(self, M: ArrayLike | None, C: ArrayLike | None, K: ArrayLike | None, *,
                  contact: ContactPairs | None = None, springs: Iterable[Spring] = (),
-                 elements: Iterable[Elements] = (),
+                 elements: Iterable[Elements] = (), laws: Iterable[Law] = (),
                  static: ArrayLike | None = None, cosine: ArrayLike | None = None,
                  sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
                  static_rotation: ArrayLike | None = None, sectors: Sectors | None = None,
@@ -292,6 +295,11 @@ class Model:
             dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
             array(f"springs[{number}].coefficient", spring.coefficient, ())
         self.elements = checked_elements(elements, n)
+        laws = tuple(laws)
+        for number, law in enumerate(laws):
+            if not isinstance(law, Law):
+                raise InputError(f"laws[{number}]: is a {type(law).__name__}, must be a Law")
+        self.laws = tuple(law.checked(number, n) for number, law in enumerate(laws))
         self.sectors = None if sectors is None else sectors.checked(n)
         if stress is not None and not isinstance(stress, Stress):
             raise InputError(f"stress: is a {type(stress).__name__}, must be Stress")
@@ -486,6 +494,9 @@ class Model:
         OutputError
             The file cannot be written.
         """
+        if self.laws:
+            raise InputError("laws: are functions, which no model file holds; make a library of "
+                             "them (group &user), or leave them out")
         pairs = {f"contact/{name}": values for name in _IN_NAMELIST
                  if (values := getattr(self.contact, name, None)) is not None}
         try:
@@ -571,6 +582,8 @@ class Model:
         if self.mistuning is not None:
             for group, kind in self.mistuning.attributes().items():
                 session.put_texts(f"{group}/kind", [kind])
+        for law in self.laws:
+            session.add_law(law)
         for name in ("title", "unit_system"):
             if getattr(self, name):
                 session.put_texts(name, [getattr(self, name)])

@@ -45,6 +45,7 @@ contains
          self%work(k)%may_wait = self%nearly .and. self%has_large_blocks
          associate (entry => self%problem%forces%entry(k))
             call entry%law%linearize(self%problem%fourier, self%work(k))
+            if (self%work(k)%failed > 0) call self%heed(k)
          end associate
          call self%take_near(k)
       end do

@@ -117,6 +117,7 @@ module fw_balance_state
       procedure :: n_turns
       procedure :: moves
       procedure :: residual
+      procedure :: heed
       procedure :: linearize
       procedure :: form_jacobians
       procedure :: take_near
@@ -686,6 +687,7 @@ contains
                call entry%law%evaluate_free(self%problem%fourier, work)
                call self%problem%incidence%scatter(entry%free_rows, m, nc, -1.0_wp, work%force, &
                                                    self%balance)
+               if (work%failed > 0) call self%heed(k)
             end if
             if (entry%law%prediction%takes_balance) then
                call add_balance(self, entry, work%prediction)
@@ -695,6 +697,18 @@ contains
       end do
       call collect(self, m, nc, r)
    end subroutine residual
+
+   !> A law that has asked for the end of the run has it, and says why.
+   subroutine heed(self, number)
+      class(balance_state), intent(inout) :: self
+      integer, intent(in) :: number
+
+      if (.not. associated(self%interrupt)) return
+      if (self%interrupt%demand /= '') return
+      self%interrupt%stop_requested = .true.
+      call self%problem%forces%entry(number)%law%complaint(self%work(number), &
+                                                           self%interrupt%demand)
+   end subroutine heed
 
    !> balance = F - Z q.
    subroutine multiply_stiffness(self, m, nc, q)

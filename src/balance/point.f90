@@ -25,9 +25,11 @@ module fw_point
                          served_by_powell = 7, served_by_kinsol = 8, served_by_arclength = 9, &
                          served_by_other_balance = 10, served_by_integration = 11
 
-   !> Work that elements of one kind take over a cycle (n_elements) [force * length].
+   !> Work that elements of one kind take over a cycle (n_elements) [force * length], and Fourier
+   !> coefficients of their forces (n_in, n_elements, 2H+1), of kinds that show them.
    type :: element_work
       real(wp), allocatable :: values(:)
+      real(wp), allocatable :: force(:, :, :)
    end type element_work
 
    !> Derivatives of one quantity by one parameter, or the deviation of the quantity.

@@ -2,7 +2,7 @@
 !> contact forces, states and friction energy.
 module fw_recovery
    use fw_kinds, only: wp, pi
-   use fw_fourier, only: coefficient_count, to_complex
+   use fw_fourier, only: coefficient_count, fourier_type, to_complex
    use fw_balance_state, only: balance_state
    use fw_point, only: point_type
    implicit none (type, external)
@@ -49,7 +49,7 @@ contains
       if (i > system%problem%fourier%n_time) point%instants_wanted = i
       if (with_contact .and. system%problem%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
-      if (with_contact) call find_element_work(system, point)
+      if (with_contact) call find_element_work(system, n_harmonics, point)
    end subroutine recover_point
 
    !> Observed quantities where the system stands, complex amplitudes (n_observed, n_retained).
@@ -199,8 +199,9 @@ contains
 
    !> Work of the elements that are neither pairs nor springs, whose inputs are displacements, where
    !> the system was evaluated last.
-   subroutine find_element_work(system, point)
+   subroutine find_element_work(system, n_harmonics, point)
       type(balance_state), intent(in) :: system
+      integer, intent(in) :: n_harmonics
       type(point_type), intent(inout) :: point
       integer :: h, i, k, kind
 
@@ -212,6 +213,7 @@ contains
             associate (f => system%work(kinds(kind))%force, &
                        u => system%work(kinds(kind))%prediction)
                allocate (point%work_of(kind)%values(size(f, 1)), source=0.0_wp)
+               call collect_forces(fourier, f, n_harmonics, point%work_of(kind)%force)
                do h = 1, fourier%n_retained
                   if (fourier%harmonic(h) == 0) cycle
                   k = fourier%column(h)
@@ -225,6 +227,26 @@ contains
          end do
       end associate
    end subroutine find_element_work
+
+   !> Coefficients of forces in the order of a result.
+   subroutine collect_forces(fourier, f, n_harmonics, force)
+      type(fourier_type), intent(in) :: fourier
+      !> (element, input, coefficient)
+      real(wp), intent(in) :: f(:, :, :)
+      integer, intent(in) :: n_harmonics
+      real(wp), allocatable, intent(out) :: force(:, :, :)
+      integer :: c, h, k, n
+
+      allocate (force(size(f, 2), size(f, 1), coefficient_count(n_harmonics)), source=0.0_wp)
+      do h = 1, fourier%n_retained
+         n = fourier%harmonic(h)
+         k = fourier%column(h)
+         if (n > n_harmonics) cycle
+         do c = 0, merge(0, 1, n == 0)
+            force(:, :, max(1, 2*n) + c) = transpose(f(:, :, k + c))
+         end do
+      end do
+   end subroutine collect_forces
 
    !> One period of the observed quantities and of the contact forces and displacements.
    subroutine recover_histories(system, m, q, n_harmonics, point)

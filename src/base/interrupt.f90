@@ -19,6 +19,8 @@ module fw_interrupt
       logical :: stop_requested = .false.
       !> Points that are enough: less than all of them where another run has taken over the rest.
       integer :: n_wanted = huge(1)
+      !> Why a law of the user has asked for the end; blank where none has.
+      character(400) :: demand = ''
       !> The time of the whole run was over.
       logical :: run_out = .false.
       !> Readings of the clock at which the run and the present point are to end.
@@ -52,7 +54,7 @@ contains
          self%run_out = self%run_out .or. clock >= self%run_end
          self%stop_requested = self%stop_requested .or. self%run_out
       end if
-      is_stopping = self%stop_requested
+      is_stopping = self%stop_requested .or. self%demand /= ''
    end function is_stopping
 
    !> Whether the run, or only the present point, is to end.
@@ -110,7 +112,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. associated(interrupt)) return
-      if (interrupt%is_stopping()) call fatal_error(error, 'stopped', status_stopped)
+      if (.not. interrupt%is_stopping()) return
+      if (interrupt%demand /= '') then
+         call fatal_error(error, trim(interrupt%demand))
+      else
+         call fatal_error(error, 'stopped', status_stopped)
+      end if
    end subroutine stop_run
 
 end module fw_interrupt

@@ -20,6 +20,8 @@ module fw_c_interface
    implicit none (type, external)
    private
 
+   public :: take_text
+
    !> Changes when a program that was built with an older header can no longer be linked.
    integer(c_int), parameter :: interface_version = 1_c_int
 

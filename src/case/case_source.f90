@@ -3,6 +3,7 @@
 module fw_case_source
    use fw_raw_model, only: raw_model
    use fw_text, only: string_type
+   use fw_user_element, only: user_element
    implicit none (type, external)
    private
 
@@ -16,6 +17,8 @@ module fw_case_source
       !> The model where the calling program gives it.
       type(raw_model), allocatable :: model
       logical :: tries_files = .false.
+      !> Laws that the calling program has added.
+      type(user_element), allocatable :: laws(:)
    end type case_source
 
 end module fw_case_source

@@ -258,6 +258,7 @@ contains
       if (.not. allocated(elements%slot)) call elements%start()
       keys%to => to
       do k = 1, size(elements%slot)
+         if (.not. elements%slot(k)%group%is_in_models()) cycle
          call keys%open(elements%slot(k)%group%name(), '')
          call elements%slot(k)%group%bind_keys(keys)
       end do

@@ -31,6 +31,8 @@ contains
       real(wp) :: x(system%n), residual
       logical :: done
 
+      call blame_law(system, reason)
+      if (allocated(reason)) return
       if (method%unbounded) then
          reason = 'the vibration grows without bound: the excitation meets a mode that neither '// &
                   'damping nor contact limits; give it damping or shift the frequency'
@@ -56,6 +58,24 @@ contains
       if (system%is_interrupted()) reason = 'why was not looked for to the end'
       if (associated(system%interrupt)) call system%interrupt%limit_point(0.0_wp)
    end subroutine explain_failure
+
+   !> A law that had no force for a motion at this frequency.
+   subroutine blame_law(system, reason)
+      type(balance_state), intent(in) :: system
+      character(:), allocatable, intent(out) :: reason
+      character(400) :: text
+      integer :: k
+
+      do k = 1, system%problem%forces%n_laws
+         associate (work => system%work(k))
+            if (work%refusal%element == 0) cycle
+            if (abs(work%refusal%omega - system%frequency()) > 0.0_wp) cycle
+            call system%problem%forces%entry(k)%law%complaint(work, text)
+            reason = trim(text)//', and no way led past that'
+            return
+         end associate
+      end do
+   end subroutine blame_law
 
    !> The largest share of the vibratory load that has a solution, from the position at rest on.
    subroutine explain_vibration(system, method, x, reason)

@@ -3,16 +3,19 @@ module fw_run
    use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_analysis, only: analysis, run_type
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_case, only: analyses, analysis_campbell, analysis_mode, analysis_modes, &
       analysis_resonance, analysis_wear, case_type
    use fw_combinations, only: check_combinations
-   use fw_error, only: error_type
+   use fw_error, only: error_type, fatal_error
    use fw_frequency_response, only: response_analysis
+   use fw_law_check, only: check_group
    use fw_kinds, only: wp
    use fw_mission_response, only: mission_analysis
    use fw_observer, only: observer_type
    use fw_point, only: point_type
-   use fw_problem, only: threads_for
+   use fw_problem, only: build_system, threads_for
    use fw_remarks, only: remark_input
    use fw_restart_file, only: read_restart, restart_type
    use fw_run_campbell, only: campbell_analysis
@@ -29,7 +32,7 @@ module fw_run
    implicit none (type, external)
    private
 
-   public :: run_case, check_case
+   public :: check_case, check_user_laws, run_case
 
 contains
 
@@ -110,7 +113,8 @@ contains
       call threads%enter(threads_for(case))
       if (analyses(case%analysis)%has_points) call remark_input(case, run%summary%remarks)
       call new_analysis(case, work)
-      call work%start(case, run, error)
+      call check_user_laws(case, error)
+      if (.not. allocated(error)) call work%start(case, run, error)
       more = associated(run%source) .and. .not. allocated(error)
       do while (more)
          call run%source%next(case, observer, point, more, error)
@@ -124,6 +128,31 @@ contains
       call close_run(case, run, clock, outcome, error, image)
    end subroutine run_case
 
+   !> Slopes that laws of the user give, compared with differences (fw_law_check).
+   subroutine check_user_laws(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(balance_problem), target :: problem
+      type(balance_state) :: system
+      integer :: k
+
+      if (.not. allocated(case%elements%slot)) return
+      do k = 1, size(case%elements%slot)
+         associate (group => case%elements%slot(k)%group)
+            if (.not. group%check .or. .not. allocated(group%function)) cycle
+            if (.not. any(group%function%has_derivative)) cycle
+            call build_system(case, problem, system, error)
+            if (allocated(error)) return
+            ! Natural frequencies are asked for without one.
+            call system%set_frequency(merge(case%sweep%start, 1.0_wp, case%sweep%start > 0.0_wp), &
+                                      error)
+            if (.not. allocated(error)) call check_group(problem, system, &
+                                                         problem%forces%elements(k), group, error)
+            if (allocated(error)) return
+         end associate
+      end do
+   end subroutine check_user_laws
+
    !> The result file, an observer that may have been used before, and a summary that knows nothing.
    subroutine open_run(case, observer, run, error, write_file, in_memory)
       type(case_type), intent(in) :: case
@@ -134,6 +163,7 @@ contains
       logical, intent(in) :: in_memory
 
       observer%stop_requested = .false.
+      observer%demand = ''
       observer%n_wanted = huge(1)
       call observer%limit_run(case%max_seconds)
       run%observer => observer
@@ -175,6 +205,7 @@ contains
       elapsed = real(clock - start, wp)/real(rate, wp)
       outcome%status = run%state%status()
       outcome%out_of_time = run%observer%run_out
+      call raise_demand(run%observer, error)
       call run%summary%remark_instants()
       if (.not. allocated(error)) call run%writer%add(run%summary%remarks, error)
       if (allocated(error) .and. run%state%n_points == 0) then
@@ -201,6 +232,16 @@ contains
       end do
       call move_alloc(run%table, outcome%summary)
    end subroutine close_run
+
+   !> The end that a law of the user has asked for is an error, whatever else came of it.
+   subroutine raise_demand(observer, error)
+      class(observer_type), intent(in) :: observer
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (observer%demand == '') return
+      if (allocated(error)) deallocate (error)
+      call fatal_error(error, trim(observer%demand))
+   end subroutine raise_demand
 
    !> A flag that may be absent: then it is true.
    pure logical function is_wanted(flag)

@@ -20,7 +20,7 @@ module fw_session
    use fw_one_level, only: one_level
    use fw_read_case, only: case_input, read_input
    use fw_problem, only: threads_for
-   use fw_run, only: check_case, run_case
+   use fw_run, only: check_case, check_user_laws, run_case
    use fw_session_points, only: point_list, point_recorder
    use fw_solver_options, only: continuation_natural, sweep_options
    use fw_strategy, only: kept_strategy, new_request
@@ -28,6 +28,7 @@ module fw_session
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_threads, only: thread_scope
+   use fw_user_element, only: user_element, user_law_type
    implicit none (type, external)
    private
 
@@ -49,6 +50,8 @@ module fw_session
       character(:), allocatable, private :: text, path
       type(string_type), allocatable, private :: keys(:)
       class(memory_model_type), allocatable, private :: model
+      !> Laws that the program has added.
+      type(user_element), allocatable, private :: laws(:)
       !> The case agrees with what was given.
       logical, private :: is_read = .false.
       !> Only between `start` and the next change.
@@ -63,6 +66,8 @@ module fw_session
       generic :: put => put_reals, put_integers, put_texts
       procedure :: observe
       procedure :: observe_all
+      procedure :: add_law
+      procedure :: add_element
       procedure :: prepare
       procedure :: is_ready
       procedure :: check
@@ -208,6 +213,51 @@ contains
       call forget(self)
    end subroutine observe
 
+   !> Add an element whose forces an object of the program gives; see fw_user_element. The object
+   !> has to live as long as the session.
+   subroutine add_law(self, name, law, side_1, side_2, parameters, odd, difference, start)
+      class(session_type), intent(inout) :: self
+      !> For messages.
+      character(*), intent(in) :: name
+      class(user_law_type), intent(inout), target :: law
+      !> Signed dofs of its inputs, and those on the other side (default: the ground) (n_in).
+      integer, intent(in) :: side_1(:)
+      integer, intent(in), optional :: side_2(:)
+      !> Constants that are handed on (default: none).
+      real(wp), intent(in), optional :: parameters(:)
+      !> Opposite motions have opposite forces; slopes are not given, but differences (default: no).
+      logical, intent(in), optional :: odd, difference
+      !> States of the unstrained element (n_state), of a law that gives a `step`.
+      real(wp), intent(in), optional :: start(:)
+      type(user_element) :: element
+
+      element%name = name
+      element%n_in = size(side_1)
+      element%side_1 = side_1
+      element%side_2 = 0*side_1
+      if (present(side_2)) element%side_2 = side_2
+      allocate (element%parameters(0))
+      if (present(parameters)) element%parameters = parameters
+      if (present(odd)) element%is_odd = odd
+      if (present(difference)) element%has_derivative = .not. difference
+      if (present(start)) then
+         element%n_state = size(start)
+         element%start = start
+      end if
+      element%object => law
+      call self%add_element(element)
+   end subroutine add_law
+
+   !> Add an element with a law of its own, ready made.
+   subroutine add_element(self, element)
+      class(session_type), intent(inout) :: self
+      type(user_element), intent(in) :: element
+
+      if (.not. allocated(self%laws)) allocate (self%laws(0))
+      self%laws = [self%laws, element]
+      call forget(self)
+   end subroutine add_element
+
    !> Bring `case` up to date with what was given, which forgets the points of the one before;
    !> does nothing where it is so already.
    subroutine prepare(self, error)
@@ -228,6 +278,7 @@ contains
       input%overrides = self%keys
       input%text = self%text
       input%origin = trim(self%origin)
+      if (allocated(self%laws)) input%laws = self%laws
       ! Damping and checks of a model must not depend on the threads of the BLAS.
       call threads%enter(0)
       if (allocated(self%model)) then
@@ -289,7 +340,8 @@ contains
       call self%points%clear()
       allocate (self%strategy)
       call threads%enter(threads_for(self%case))
-      call self%strategy%start(self%case, error)
+      call check_user_laws(self%case, error)
+      if (.not. allocated(error)) call self%strategy%start(self%case, error)
       call threads%leave()
       if (allocated(error)) call forget_system(self)
    end subroutine start
@@ -342,6 +394,7 @@ contains
       end if
       if (allocated(error)) return
       observer%stop_requested = .false.
+      observer%demand = ''
       recorder%list => self%points
       recorder%observer => observer
       call threads%enter(threads_for(self%case))
@@ -434,6 +487,7 @@ contains
       if (allocated(other%path)) self%path = other%path
       if (allocated(other%keys)) self%keys = other%keys
       if (allocated(other%model)) self%model = other%model
+      if (allocated(other%laws)) self%laws = other%laws
       self%origin = other%origin
       self%is_read = other%is_read
    end subroutine copy

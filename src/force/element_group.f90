@@ -10,9 +10,11 @@
 !> `bind_keys` is read from the namelist and is a part of a model file as well; all parts of one
 !> file or program have as many elements as the first array.
 module fw_element_group
+   use fw_error, only: error_type
    use fw_force_law, only: force_law
    use fw_key, only: key_visitor
    use fw_kinds, only: wp
+   use fw_user_element, only: user_element
    implicit none (type, external)
    private
 
@@ -23,12 +25,19 @@ module fw_element_group
    type, abstract :: element_group
       !> As the input counts them: dampers, terms. Of one sector.
       integer :: n_given = 0
+      !> Sectors whose motion is solved for: what stands here is of one.
+      integer :: n_sectors = 1
       !> What each of them is multiplied by (n_given): the parameter `<group>%coefficient`.
       real(wp), allocatable :: coefficient(:)
       !> Elements of the law, of one sector, and their inputs; none where both sides are 0 (n_in,
       !> n_elements). Filled by `settle`.
       integer :: n_elements = 0, n_in = 0
       integer, allocatable :: row_side_1(:, :), row_side_2(:, :), row_sector_2(:, :)
+      !> Functions of a user that give the forces, where a kind has such, whether their slopes are
+      !> to be checked before a run, and what they may be off.
+      type(user_element), allocatable :: function(:)
+      logical :: check = .true.
+      real(wp) :: check_tolerance = 1.0e-5_wp
    contains
       !> The group of the namelist.
       procedure(name_interface), deferred :: name
@@ -50,6 +59,9 @@ module fw_element_group
       !> motion.
       procedure(is_interface), deferred :: is_odd
       procedure(is_interface), deferred :: is_linear
+      procedure :: is_in_models
+      procedure :: load
+      procedure :: take_laws
       procedure :: reserve_rows
    end type element_group
 
@@ -105,6 +117,35 @@ module fw_element_group
    end interface
 
 contains
+
+   !> Whether the arrays of the keys are parts of a model too.
+   pure logical function is_in_models(self)
+      class(element_group), intent(in) :: self
+
+      is_in_models = .true.
+      associate (unused => self)
+      end associate
+   end function is_in_models
+
+   !> Bring in what stands in files beside the namelist, whose folder is given: nothing of most
+   !> kinds.
+   subroutine load(self, folder, error)
+      class(element_group), intent(inout) :: self
+      character(*), intent(in) :: folder
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (unused => self, neither => folder)
+      end associate
+   end subroutine load
+
+   !> Elements with laws of a program, behind those that the input gives: nothing to most kinds.
+   subroutine take_laws(self, laws)
+      class(element_group), intent(inout) :: self
+      type(user_element), intent(in) :: laws(:)
+
+      associate (unused => self, neither => laws)
+      end associate
+   end subroutine take_laws
 
    !> Rows of elements, all absent.
    pure subroutine reserve_rows(self, n_in, n_elements)

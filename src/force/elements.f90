@@ -5,13 +5,15 @@ module fw_elements
    use fw_element_group, only: element_group, group_name_length
    use fw_kinds, only: wp
    use fw_polynomial_group, only: polynomial_group
+   use fw_user_element, only: user_element
+   use fw_user_group, only: user_group
    implicit none (type, external)
    private
 
    public :: element_list, element_kind, element_slot, n_element_kinds
 
    !> A new kind is a line in `new_group`, and one more here.
-   integer, parameter :: n_element_kinds = 2
+   integer, parameter :: n_element_kinds = 3
 
    type :: element_slot
       class(element_group), allocatable :: group
@@ -26,8 +28,11 @@ module fw_elements
       procedure :: are_odd
       procedure :: are_linear
       procedure :: count_of
+      procedure :: extent_of
       procedure :: coefficients_of
       procedure :: set_coefficients
+      procedure :: add_laws
+      procedure :: set_sectors
    end type element_list
 
 contains
@@ -40,6 +45,7 @@ contains
       select case (kind)
       case (1); allocate (polynomial_group :: group)
       case (2); allocate (damper_group :: group)
+      case (3); allocate (user_group :: group)
       case default ! no such kind
       end select
    end subroutine new_group
@@ -55,6 +61,28 @@ contains
          call new_group(k, self%slot(k)%group)
       end do
    end subroutine start
+
+   !> Elements with laws of a program, behind those that the input gives.
+   subroutine add_laws(self, laws)
+      class(element_list), intent(inout) :: self
+      type(user_element), intent(in) :: laws(:)
+      integer :: k
+
+      do k = 1, size(self%slot)
+         call self%slot(k)%group%take_laws(laws)
+      end do
+   end subroutine add_laws
+
+   !> How many sectors are solved for.
+   pure subroutine set_sectors(self, n)
+      class(element_list), intent(inout) :: self
+      integer, intent(in) :: n
+      integer :: k
+
+      do k = 1, size(self%slot)
+         self%slot(k)%group%n_sectors = n
+      end do
+   end subroutine set_sectors
 
    !> Elements of all kinds, of one sector.
    pure integer function n_elements(self) result(n)
@@ -119,6 +147,23 @@ contains
          if (self%slot(k)%group%name() == name) n = self%slot(k)%group%n_given
       end do
    end function count_of
+
+   !> Inputs of an element of a group (1), or elements of all sectors that are solved for (2).
+   pure integer function extent_of(self, name, dimension) result(n)
+      class(element_list), intent(in) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: dimension
+      integer :: k
+
+      n = 0
+      if (.not. allocated(self%slot)) return
+      do k = 1, size(self%slot)
+         associate (group => self%slot(k)%group)
+            if (group%name() == name) n = merge(group%n_in, group%n_elements*group%n_sectors, &
+                                               dimension == 1)
+         end associate
+      end do
+   end function extent_of
 
    !> Their coefficients.
    pure function coefficients_of(self, name) result(values)

@@ -19,7 +19,7 @@ module fw_force_law
    private
 
    public :: force_law, force_workspace, law_room
-   public :: input_facts, prediction_type, law_facts
+   public :: input_facts, prediction_type, law_facts, refusal_type
    public :: pair_stuck, pair_open, pair_mixed
 
    !> State of an element over the whole period: its derivative is the identity, zero, or any other
@@ -127,6 +127,13 @@ module fw_force_law
    type, abstract :: law_room
    end type law_room
 
+   !> The last motion that a law had no force for, and what it said to it: of which element, at
+   !> which instant, with which displacements and rates (of the first inputs).
+   type :: refusal_type
+      integer :: element = 0, instant = 0, status = 0
+      real(wp) :: omega = 0.0_wp, u(4) = 0.0_wp, v(4) = 0.0_wp
+   end type refusal_type
+
    !> What evaluations of one law leave: one for each that evaluates. Sizes are (n_elements,
    !> n_components, n_coefficients or n_time).
    type :: force_workspace
@@ -173,6 +180,9 @@ module fw_force_law
       real(wp), allocatable :: slip(:), slip_derivative(:, :)
       !> Whether anybody wants that derivative: at held depths only the sliding itself.
       logical :: differentiates_slip = .false.
+      !> Not 0 where the last evaluation has no force: above 0 the run is to end.
+      integer :: failed = 0
+      type(refusal_type) :: refusal
       !> Angular frequency of the period: makes a derivative by tau one by t.
       real(wp) :: rate = 1.0_wp
       class(law_room), allocatable :: room
@@ -226,6 +236,7 @@ module fw_force_law
       procedure :: n_parameters
       procedure :: find_parameter
       procedure :: by_frequency
+      procedure :: complaint
       procedure :: by_parameter
       procedure :: by_constant
       procedure :: instants_wanted
@@ -625,6 +636,18 @@ contains
       associate (unused => self, unused_fourier => fourier)
       end associate
    end subroutine by_frequency
+
+   !> What the law could not say of the last motion that it had no force for: nothing of most laws.
+   subroutine complaint(self, work, text)
+      class(force_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      ! allow(C072): a text of the caller
+      character(*), intent(out) :: text
+
+      text = ''
+      associate (unused => self, unused_work => work)
+      end associate
+   end subroutine complaint
 
    !> Which element, and which of its constants, the value of a parameter is (see by_parameter).
    pure subroutine find_parameter(self, value, element, number)

@@ -9,20 +9,37 @@
 module fw_instant_law
    use fw_force_law, only: force_law, force_workspace, law_room, pair_mixed
    use fw_fourier, only: fourier_type
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_lapack, only: dgemm
    use fw_wave_sums, only: wave_sums, wave_table
    implicit none (type, external)
    private
 
-   public :: instant_law, element_motion
+   public :: instant_law, element_motion, path_room, reserve_motion
 
    !> Instants of one product: enough for the speed of dgemm, few enough for the cache.
    integer, parameter :: block = 64
 
+   !> Room for the same numbers one behind the other, where a law asks for it.
+   type :: motion_scratch
+      real(wp), allocatable :: u(:), v(:), force(:), other_force(:), by_u(:), by_v(:)
+   end type motion_scratch
+
+   !> Room of a law whose elements remember (see `differentiate_path` and fw_user_path).
+   type :: path_room
+      integer :: n_time = 0, n_coefficients = 0
+      !> Base functions at the instants, and their rates by tau (n_coefficients, n_time).
+      real(wp), allocatable :: wave(:, :), rate(:, :)
+      !> For the largest element: states (0 to n_time), slopes of steps, derivatives of states by
+      !> coefficients of the inputs, before and after a turn.
+      real(wp), allocatable :: state(:), slope(:), by_motion(:), carried(:)
+   end type path_room
+
    !> One element over the period: what it is asked, and what it answers. Inputs stand innermost.
    type :: element_motion
       integer :: element = 0, n_time = 0
+      !> omega t at the instants.
+      real(wp), allocatable :: tau(:)
       !> [rad/s]
       real(wp) :: omega = 0.0_wp
       !> Displacements and rates by time (n_in, n_time).
@@ -33,6 +50,11 @@ module fw_instant_law
       !> (j, i, instant). What is not set is zero.
       logical :: wants_slopes = .false.
       real(wp), allocatable :: by_u(:, :, :), by_v(:, :, :)
+      !> Other than 0 where there is no force, and the instant where that shows: above 0 the run is
+      !> to end.
+      integer :: status = 0, instant = 1
+      type(motion_scratch), allocatable :: scratch
+      type(path_room), allocatable :: path
    end type element_motion
 
    type, extends(law_room) :: instant_room
@@ -53,6 +75,11 @@ module fw_instant_law
       logical :: takes_rates = .false.
       !> Slopes by displacements are those of a potential: df_i/du_j = df_j/du_i.
       logical :: has_potential = .false.
+      logical :: needs_scratch = .false.
+      !> Forces may follow from the frequency by more than the rates.
+      logical :: takes_frequency = .false.
+      !> Elements whose forces follow from the whole motion (n_elements); unallocated: none.
+      logical, allocatable :: remembers(:)
    contains
       procedure :: take_inputs
       procedure :: reserve
@@ -61,6 +88,8 @@ module fw_instant_law
       procedure :: slopes_about
       procedure :: by_frequency
       procedure :: take_motion
+      procedure :: reserve_path
+      procedure :: differentiate_path
       procedure(act_interface), deferred :: act
    end type instant_law
 
@@ -103,7 +132,8 @@ contains
       allocate (room)
       n = self%n_components*fourier%n_coefficients
       allocate (work%jacobian(n, n, self%n_elements), source=0.0_wp)
-      call reserve_motion(self%n_in, fourier%n_time, room%motion)
+      call reserve_motion(self%n_in, fourier%n_time, self%needs_scratch, room%motion)
+      call self%reserve_path(fourier, room%motion)
       allocate (room%slope(fourier%n_time))
       if (self%takes_rates) then
          allocate (room%rate, source=work%prediction)
@@ -120,10 +150,43 @@ contains
       call move_alloc(room, work%room)
    end subroutine reserve
 
-   pure subroutine reserve_motion(n_in, n_time, motion)
-      integer, intent(in) :: n_in, n_time
-      type(element_motion), intent(out) :: motion
+   !> Room for elements that remember: no law has such by itself.
+   subroutine reserve_path(self, fourier, motion)
+      class(instant_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(element_motion), intent(inout) :: motion
 
+      associate (unused => self, neither => fourier, nor => motion)
+      end associate
+   end subroutine reserve_path
+
+   !> The derivative of an element that remembers, transposed: coefficients of input j, then of
+   !> force i.
+   subroutine differentiate_path(self, fourier, motion, jacobian)
+      class(instant_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(element_motion), intent(inout) :: motion
+      real(wp), intent(inout), contiguous :: jacobian(:, :)
+
+      associate (unused => self, neither => fourier, nor => motion, none => jacobian)
+      end associate
+   end subroutine differentiate_path
+
+   pure subroutine reserve_motion(n_in, n_time, with_scratch, motion)
+      integer, intent(in) :: n_in, n_time
+      logical, intent(in) :: with_scratch
+      type(element_motion), intent(out) :: motion
+      integer :: k, n
+
+      motion%tau = [(2.0_wp*pi*real(k, wp)/real(n_time, wp), k=0, n_time - 1)]
+      if (with_scratch) then
+         n = n_in*n_time
+         allocate (motion%scratch)
+         associate (s => motion%scratch)
+            allocate (s%u(n), s%v(n), s%force(n), s%other_force(n), source=0.0_wp)
+            allocate (s%by_u(n_in*n), s%by_v(n_in*n), source=0.0_wp)
+         end associate
+      end if
       motion%n_time = n_time
       allocate (motion%u(n_in, n_time), motion%v(n_in, n_time), motion%force(n_in, n_time), &
                 source=0.0_wp)
@@ -137,6 +200,7 @@ contains
       integer :: c, i, k
 
       if (self%n_elements == 0) return
+      work%failed = 0
       call fourier%to_time(self%n_elements*self%n_components, work%prediction, &
                            work%prediction_time, work%fft)
       select type (room => work%room)
@@ -152,6 +216,7 @@ contains
          do i = 1, self%n_elements
             call self%take_motion(work, i, room%motion)
             call self%act(room%motion)
+            if (room%motion%status /= 0) call note_refusal(self%n_in, room%motion, work)
             do k = 1, fourier%n_time
                do c = 1, self%n_in
                   work%force_time(i, c, k) = room%motion%force(c, k)
@@ -164,6 +229,28 @@ contains
       ! Every element has a block in the derivative.
       work%state = pair_mixed
    end subroutine evaluate
+
+   !> The motion that an element has no force for.
+   pure subroutine note_refusal(n_in, motion, work)
+      integer, intent(in) :: n_in
+      type(element_motion), intent(inout) :: motion
+      type(force_workspace), intent(inout) :: work
+      integer :: n
+
+      ! What ends the run is kept: it comes before what takes a step back.
+      if (work%failed > 0) return
+      work%failed = motion%status
+      associate (r => work%refusal)
+         n = min(n_in, size(r%u))
+         r%element = motion%element
+         r%instant = motion%instant
+         r%status = motion%status
+         r%omega = motion%omega
+         r%u(:n) = motion%u(:n, motion%instant)
+         r%v(:n) = motion%v(:n, motion%instant)
+      end associate
+      motion%status = 0
+   end subroutine note_refusal
 
    !> Inputs of an element at the instants of the last evaluation.
    subroutine take_motion(self, work, element, motion)
@@ -204,9 +291,17 @@ contains
          room%motion%wants_slopes = .true.
          do i = 1, self%n_elements
             call self%take_motion(work, i, room%motion)
+            if (allocated(self%remembers)) then
+               if (self%remembers(i)) then
+                  call self%differentiate_path(fourier, room%motion, work%jacobian(:, :, i))
+                  if (room%motion%status /= 0) call note_refusal(self%n_in, room%motion, work)
+                  cycle
+               end if
+            end if
             room%motion%by_u = 0.0_wp
             room%motion%by_v = 0.0_wp
             call self%act(room%motion)
+            if (room%motion%status /= 0) call note_refusal(self%n_in, room%motion, work)
             do out = 1, self%n_in
                do in = 1, self%n_in
                   if (self%has_potential .and. .not. self%takes_rates .and. in < out) then
@@ -250,7 +345,7 @@ contains
       end do
    end subroutine add_rates
 
-   !> Forces by the frequency, at held displacements: df/dv v/omega.
+   !> Forces by the frequency, at held displacements: df/dv v/omega, or differences.
    subroutine by_frequency(self, fourier, work)
       class(instant_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -262,21 +357,48 @@ contains
       if (.not. self%takes_rates) return
       select type (room => work%room)
       type is (instant_room)
-         room%motion%wants_slopes = .true.
+         room%motion%wants_slopes = .not. self%takes_frequency
          do i = 1, self%n_elements
             call self%take_motion(work, i, room%motion)
-            room%motion%by_u = 0.0_wp
-            room%motion%by_v = 0.0_wp
-            call self%act(room%motion)
-            do k = 1, fourier%n_time
-               force(:, k) = matmul(room%motion%v(:, k), room%motion%by_v(:, :, k))/work%rate
-            end do
+            if (self%takes_frequency) then
+               call differ_by_frequency(self, room%motion, force)
+            else
+               room%motion%by_u = 0.0_wp
+               room%motion%by_v = 0.0_wp
+               call self%act(room%motion)
+               do k = 1, fourier%n_time
+                  force(:, k) = matmul(room%motion%v(:, k), room%motion%by_v(:, :, k))/work%rate
+               end do
+            end if
+            room%motion%status = 0
             call dgemm('N', 'T', fourier%n_coefficients, self%n_in, fourier%n_time, 1.0_wp, &
                        fourier%analysis, fourier%n_coefficients, force, self%n_in, 0.0_wp, &
                        work%output(1, i), fourier%n_coefficients)
          end do
       end select
    end subroutine by_frequency
+
+   !> Forces at frequencies a little higher and lower, at held displacements.
+   subroutine differ_by_frequency(self, motion, force)
+      class(instant_law), intent(in) :: self
+      type(element_motion), intent(inout) :: motion
+      real(wp), intent(out) :: force(:, :)
+      !> Where round-off and the square of the step meet.
+      real(wp), parameter :: step = 1.0e-5_wp
+      real(wp) :: omega
+
+      omega = motion%omega
+      motion%v = (1.0_wp + step)*motion%v
+      motion%omega = (1.0_wp + step)*omega
+      call self%act(motion)
+      force = motion%force
+      motion%v = (1.0_wp - step)/(1.0_wp + step)*motion%v
+      motion%omega = (1.0_wp - step)*omega
+      call self%act(motion)
+      force = (force - motion%force)/(2.0_wp*step*omega)
+      motion%v = motion%v/(1.0_wp - step)
+      motion%omega = omega
+   end subroutine differ_by_frequency
 
    !> The block of an input and an output is that of these two turned.
    pure subroutine mirror(nc, row, column, gain)
@@ -331,7 +453,7 @@ contains
       type(element_motion) :: motion
 
       slope = 0.0_wp
-      call reserve_motion(self%n_in, 1, motion)
+      call reserve_motion(self%n_in, 1, self%needs_scratch, motion)
       motion%element = element
       motion%wants_slopes = .true.
       motion%u(:, 1) = y(:self%n_in)

@@ -31,6 +31,7 @@ contains
          input%origin = origin
          input%tries_files = source%tries_files
          input%is_changed = .true.
+         if (allocated(source%laws)) input%laws = source%laws
          do i = 1, size(changes)
             call append(input%overrides, changes(i)%text)
          end do

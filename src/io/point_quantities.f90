@@ -17,7 +17,7 @@ module fw_point_quantities
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
       follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, has_levels, &
       has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
-      is_response, moves_base, scales_load, shows_contact, wears
+      is_response, moves_base, scales_load, shows_contact, shows_user, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -130,6 +130,10 @@ contains
       call add('structural/dissipation', r, '<energy>', 'point', &
                'work of hysteretic damping per cycle', has_structural)
       call add('speed', r, 'rad/s', 'point', 'rotation speed', follows_speed)
+      call add('user/force', r, '', 'point coefficient law input', &
+               'Fourier coefficients of the forces of user laws', shows_user)
+      call add('user/work', r, '', 'point law', &
+               'work per cycle that user laws take', shows_user)
       call add('history/observed', r, '<length>', 'point instant observed', &
                'observed quantities over one period', always)
       call add('history/force', r, '<force>', 'point instant pair direction', &
@@ -272,6 +276,10 @@ contains
          n = case%stress%n_points*case%model%cyclic%n_solved()
       case ('component')
          n = 6
+      case ('law')
+         n = case%elements%extent_of('user', 2)
+      case ('input')
+         n = case%elements%extent_of('user', 1)
       case ('patch')
          n = count_patches(case%contact)
       case ('dampers')
@@ -405,6 +413,16 @@ contains
          values = [point%structural_work]
       case ('speed')
          values = [point%speed]
+      case ('user/force')
+         if (.not. allocated(point%work_of)) return
+         k = element_kind('user')
+         associate (found => point%work_of(k))
+            if (allocated(found%force)) values = reshape(found%force, [size(found%force)])
+         end associate
+      case ('user/work')
+         if (.not. allocated(point%work_of)) return
+         k = element_kind('user')
+         if (allocated(point%work_of(k)%values)) values = point%work_of(k)%values
       case ('history/observed')
          call by_rows(point%history, values)
       case ('history/force')

@@ -11,7 +11,7 @@ module fw_quantity_conditions
              follows_speed, goes_over, has_dampers, has_endurance, has_levels, has_stress, &
              has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
              is_response, moves_base, scales_load, &
-             shows_contact, wears
+             shows_contact, shows_user, wears
 
 contains
 
@@ -58,6 +58,13 @@ contains
 
       moves_base = allocated(case%model%base_parts)
    end function moves_base
+
+   !> Elements with laws of a user, which are shown as contact is.
+   pure logical function shows_user(case)
+      type(case_type), intent(in) :: case
+
+      shows_user = case%output%contact .and. case%elements%extent_of('user', 2) > 0
+   end function shows_user
 
    !> A nonlinear mode.
    pure logical function is_mode(case)

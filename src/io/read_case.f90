@@ -15,7 +15,7 @@ module fw_read_case
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
-   use fw_read_elements, only: read_contact, read_elements, read_springs
+   use fw_read_elements, only: read_contact, read_elements, read_springs, user_element
    use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
@@ -55,6 +55,8 @@ module fw_read_case
       logical :: tries_files = .false.
       !> One of the cases that are read from a source which another has kept.
       logical :: is_changed = .false.
+      !> Elements with laws that the calling program has added.
+      type(user_element), allocatable :: laws(:)
    end type case_input
 
    !> Harmonics of a nonlinear mode, a resonance or a controlled response where nothing is said of
@@ -127,7 +129,7 @@ contains
       reader%tries_files = input%tries_files
       call read_units(reader, input%path, error, memory_model)
       if (allocated(error)) return
-      call read_keys(reader, input%path, case, error, memory_model)
+      call read_keys(reader, input%path, case, error, memory_model, input%laws)
       if (allocated(error)) return
       call choose_law(reader, case)
       call choose_harmonics(reader, case)
@@ -156,6 +158,7 @@ contains
          source%overrides = input%overrides
          source%tries_files = input%tries_files
          if (present(memory_model)) source%model = memory_model
+         if (allocated(input%laws)) source%laws = input%laws
       end associate
    end subroutine keep_source
 
@@ -261,19 +264,20 @@ contains
    end function goes_with_accuracy
 
    !> Every key, in the order of the effective input.
-   subroutine read_keys(reader, path, case, error, memory_model)
+   subroutine read_keys(reader, path, case, error, memory_model, laws)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
       type(error_type), allocatable, intent(out) :: error
       type(raw_model), intent(in), optional :: memory_model
+      type(user_element), intent(in), optional :: laws(:)
       type(raw_model) :: raw
 
       ! Sizes (n_dof, n_pairs, n_springs) are told before the arrays whose shapes name them.
       call case%bind_keys(reader)
       call read_sensitivity(reader, case%sensitivity)
       call read_resonance(reader, case%analysis, case%resonance, case%varied)
-      call read_structure(reader, path, case, raw, error, memory_model)
+      call read_structure(reader, path, case, raw, error, memory_model, laws)
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)
       if (allocated(raw%unread)) case%unread = raw%unread
@@ -394,7 +398,7 @@ contains
    end function speed_order_of
 
    !> The model with its contact, springs and loads.
-   subroutine read_structure(reader, path, case, raw, error, memory_model)
+   subroutine read_structure(reader, path, case, raw, error, memory_model, laws)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
@@ -402,6 +406,7 @@ contains
       type(raw_model), intent(out) :: raw
       type(error_type), allocatable, intent(out) :: error
       type(raw_model), intent(in), optional :: memory_model
+      type(user_element), intent(in), optional :: laws(:)
       type(model_options) :: options
       type(load_terms) :: terms
       character(:), allocatable :: worn
@@ -429,7 +434,9 @@ contains
          call append(case%inputs, worn)
       end if
       call read_springs(reader, raw%springs, case%model%cyclic%n_solved(), case%springs)
-      call read_elements(reader, raw%elements, case%elements)
+      call read_elements(reader, raw%elements, directory_of(path), case%elements, error, laws)
+      if (allocated(error)) return
+      call case%elements%set_sectors(case%model%cyclic%n_solved())
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs, case%elements)
       ! A number of 0 was meant.
       case%idle_contact = case%contact%n_pairs == 0 .and. reader%has_group('contact') .and. &

@@ -4,20 +4,28 @@
 module fw_read_elements
    use fw_element_group, only: element_group
    use fw_elements, only: element_list
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_read_contact, only: read_contact, read_springs
    use fw_reader, only: reader_type
+   use fw_text, only: to_text
+   use fw_user_element, only: user_element
    implicit none (type, external)
    private
 
-   public :: read_contact, read_elements, read_springs
+   public :: read_contact, read_elements, read_springs, user_element
 
 contains
 
-   subroutine read_elements(reader, held, elements)
+   subroutine read_elements(reader, held, folder, elements, error, laws)
       type(reader_type), intent(inout) :: reader
       !> What the model holds.
       type(element_list), intent(in) :: held
+      !> Of the namelist.
+      character(*), intent(in) :: folder
       type(element_list), intent(out) :: elements
+      type(error_type), allocatable, intent(out) :: error
+      !> Elements that the calling program has added.
+      type(user_element), intent(in), optional :: laws(:)
       type(element_list) :: nothing
       integer :: k
 
@@ -25,14 +33,41 @@ contains
       elements = nothing
       if (allocated(held%slot)) elements = held
       do k = 1, size(elements%slot)
-         call read_group(reader, nothing%slot(k)%group, elements%slot(k)%group)
+         call read_group(reader, nothing%slot(k)%group, folder, elements%slot(k)%group, error)
+         if (allocated(error)) return
       end do
+      if (.not. present(laws)) return
+      if (.not. reader%failed()) call check_dofs(laws, reader%extents('n_dof'), error)
+      if (.not. (allocated(error) .or. reader%failed())) call elements%add_laws(laws)
    end subroutine read_elements
 
-   subroutine read_group(reader, empty, group)
+   !> Dofs of laws that no key has brought.
+   subroutine check_dofs(laws, n_dof, error)
+      type(user_element), intent(in) :: laws(:)
+      integer, intent(in) :: n_dof(1)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: c, i
+
+      do i = 1, size(laws)
+         do c = 1, laws(i)%n_in
+            associate (one => laws(i)%side_1(c), two => laws(i)%side_2(c))
+               if (max(abs(one), abs(two)) <= n_dof(1) .and. abs(one) /= abs(two)) cycle
+               call fatal_error(error, 'user law '//trim(laws(i)%name)//': input '//to_text(c)// &
+                                ' is between dofs '//to_text(one)//' and '//to_text(two)// &
+                                ': must be two different ones from 0 to '//to_text(n_dof(1))// &
+                                ', or their negatives', status_input)
+               return
+            end associate
+         end do
+      end do
+   end subroutine check_dofs
+
+   subroutine read_group(reader, empty, folder, group, error)
       type(reader_type), intent(inout) :: reader
       class(element_group), intent(in) :: empty
+      character(*), intent(in) :: folder
       class(element_group), allocatable, intent(inout) :: group
+      type(error_type), allocatable, intent(out) :: error
       character(160) :: text
       character(24) :: key
       integer :: n, n_held
@@ -59,7 +94,8 @@ contains
          call reader%refuse(trim(empty%name()), trim(key), trim(text))
          return
       end if
-      call group%settle()
+      call group%load(folder, error)
+      if (.not. allocated(error)) call group%settle()
    end subroutine read_group
 
 end module fw_read_elements

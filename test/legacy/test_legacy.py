@@ -224,6 +224,18 @@ def test_threads(prefix, tmp_path):
         assert result.attrs["status"] in (b"complete", "complete")
 
 
+def test_threads_with_laws(prefix, tmp_path):
+    program = compile_c(HERE / "law_threads.c", prefix, tmp_path)
+    output = run(program)
+    assert output.endswith("0 differences\n")
+    found = re.findall(r"case (\d): status (\d), (\d+) values, (\d+) calls, (.*)", output)
+    assert [int(status) for _, status, *_ in found[:6]] == [0] * 6
+    assert min(int(n) for _, _, *counts, _ in found[:6] for n in counts) > 20
+    # What has no force where the case goes, and what ends the run, in words.
+    assert int(found[6][1]) == 4 and int(found[7][1]) == 1
+    assert "returned 7" in found[7][4]
+
+
 @pytest.fixture(scope="module")
 def misuse(prefix, tmp_path_factory):
     """What misuse.c prints: label to (status, message); and where it ran."""

@@ -25,6 +25,8 @@ KEYS = {
                 "weakening_speed", "weakening_exponent", "mu_viscous", "speed_1", "speed_2",
                 "iwan_chi", "iwan_beta", "bouc_wen_exponent", "bouc_wen_beta", "penalty_scale",
                 "memory", "worn", "worn_step"],
+    "user": ["n_elements", "library", "symbol", "n_in", "side_1", "side_2", "n_parameters",
+             "parameters", "derivative", "odd", "thread_safe", "check", "check_tolerance"],
     "spring": ["n_springs", "side_1", "side_2", "sector_2", "coefficient", "power"],
     "polynomial": ["n_terms", "of", "factors", "coefficient", "dof"],
     "damper": ["n_dampers", "side_1", "side_2", "sector_2", "coefficient", "power",

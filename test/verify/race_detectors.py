@@ -9,11 +9,13 @@ from optimisation import plain_build
 
 HERE = Path(__file__).resolve().parent
 MODEL = ROOT / "example" / "blade_sector" / "sector_16.h5"
-LEAST_CASES = 11
+#: Programs of handles, with what they are told.
+PROGRAMS = {"threads": (MODEL, "{folder}", "1"), "law_threads": ("1",)}
+LEAST_CASES = 19
 
 
 def races(setting):
-    """Twelve handles at the same time, their library watched by the thread sanitizer."""
+    """Twelve handles at the same time, and eight with laws, under the thread sanitizer."""
     directory, _ = build(setting, "races", "-DFRETWEAR_SANITIZE=thread",
                          "-DCMAKE_Fortran_FLAGS=-O1 -g", "-DFRETWEAR_PYTHON=OFF",
                          "-DFRETWEAR_SHARED=OFF", "-DFRETWEAR_TESTS=OFF")
@@ -52,14 +54,19 @@ def watch(directory, guarded, detector):
         run(["cmake", "--install", directory, "--prefix", folder])
         flags = run(["pkg-config", "--cflags", "--libs", "fretwear-static"], env=dict(
             os.environ, PKG_CONFIG_PATH=str(next(folder.glob("**/pkgconfig"))))).stdout.split()
-        sources = [HERE / "critical.c", ROOT / "test" / "legacy" / "threads.c"]
-        text, reports = detector(
-            ["cc", "-g", "-std=c99", "-D_POSIX_C_SOURCE=200809L",
-             *([] if guarded else ["-DUNGUARDED"]), *sources, "-o", folder / "threads", *flags,
-             "-lpthread", "-lm"], [folder / "threads", MODEL, folder, "1"])
-    differences = re.search(r"^(\d+) differences$", text, re.MULTILINE)
+        text, reports = "", 0
+        for name, told in PROGRAMS.items():
+            sources = [HERE / "critical.c", ROOT / "test" / "legacy" / f"{name}.c"]
+            said, seen = detector(
+                ["cc", "-g", "-std=c99", "-D_POSIX_C_SOURCE=200809L",
+                 *([] if guarded else ["-DUNGUARDED"]), *sources, "-o", folder / name, *flags,
+                 "-lpthread", "-lm"],
+                [folder / name, *(str(word).format(folder=folder) for word in told)])
+            text, reports = text + said, reports + seen
+    ended = re.findall(r"^(\d+) differences$", text, re.MULTILINE)
+    differences = str(sum(map(int, ended))) if len(ended) == len(PROGRAMS) else "ended early"
     return (len(re.findall(r"^case \d+: status", text, re.MULTILINE)), reports,
-            differences[1] if differences else "ended early", text)
+            differences, text)
 
 
 def thread_sanitizer(compile_command, command):

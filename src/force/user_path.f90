@@ -1,0 +1,471 @@
+!> Elements of a user that remember: their state z is stepped from instant to instant,
+!>
+!>   (z_k, f_k) = step(z_k-1, u_k-1, v_k-1, u_k, v_k),
+!>
+!> turn after turn until it repeats. The first turn comes from the unstrained element, which is
+!> strained to the motion in one step. What has not repeated after a few turns is looked for by
+!> Newton's method on z_N(z_0) = z_0, with (I - M) inverted where it is regular: what keeps all that
+!> it has come to, as friction that sticks, stays where the turns have left it.
+!>
+!> Derivatives by the coefficients of the motion are stepped alongside, through all turns.
+module fw_user_path
+   use fw_fourier, only: fourier_type
+   use fw_instant_law, only: element_motion, path_room
+   use fw_kinds, only: pi, wp
+   use fw_user_element, only: user_element
+   implicit none (type, external)
+   private
+
+   public :: differentiate_element, follow_element, new_path, not_settled, slopes_of_step, &
+             step_slopes
+
+   !> The status of a state that does not come to repeat.
+   integer, parameter :: not_settled = -1000001
+   !> Turns before Newton's method, and its steps.
+   integer, parameter :: plain_turns = 4, newton_steps = 40
+   !> Change over a turn, relative to the largest state, that is none; and the one that is taken
+   !> where round-off lets it fall no further.
+   real(wp), parameter :: repeated = 1.0e-12_wp, nearly_repeated = 1.0e-9_wp
+   !> Singular values of I - M below it are those of states that stay as they are.
+   real(wp), parameter :: singular = 1.0e-9_wp
+   !> Step of differences that stand for slopes, over the size of the input.
+   real(wp), parameter :: relative_step = 1.0e-5_wp
+
+contains
+
+   type(path_room) function new_path(element, fourier) result(self)
+      type(user_element), intent(in) :: element(:)
+      type(fourier_type), intent(in) :: fourier
+      integer :: h, i, k, m, n, n_slope
+
+      self%n_time = fourier%n_time
+      self%n_coefficients = fourier%n_coefficients
+      self%wave = fourier%synthesis
+      allocate (self%rate, mold=self%wave)
+      self%rate = 0.0_wp
+      do h = 1, fourier%n_retained
+         if (fourier%harmonic(h) == 0) cycle
+         k = fourier%column(h)
+         self%rate(k, :) = -fourier%harmonic(h)*self%wave(k + 1, :)
+         self%rate(k + 1, :) = fourier%harmonic(h)*self%wave(k, :)
+      end do
+      n_slope = 0
+      do i = 1, size(element)
+         n_slope = max(n_slope, (element(i)%n_state + 4*element(i)%n_in)* &
+                       (element(i)%n_state + element(i)%n_in))
+      end do
+      n = maxval(element%n_state)
+      m = maxval(element%n_in)
+      allocate (self%state(n*(fourier%n_time + 1)), self%slope(n_slope*(fourier%n_time + 1)), &
+                self%by_motion(n*m*fourier%n_coefficients), &
+                self%carried(n*m*fourier%n_coefficients), source=0.0_wp)
+   end function new_path
+
+   !> Forces over the period that repeats.
+   subroutine follow_element(element, motion, path)
+      type(user_element), intent(in) :: element
+      type(element_motion), intent(inout) :: motion
+      type(path_room), intent(inout) :: path
+
+      call settle(element, motion, path, element%n_state, element%n_in, .false., path%state, &
+                  path%slope, path%by_motion, path%carried)
+   end subroutine follow_element
+
+   !> The same, and the derivative of the forces by the coefficients of the inputs, transposed.
+   subroutine differentiate_element(element, fourier, motion, path, jacobian)
+      type(user_element), intent(in) :: element
+      type(fourier_type), intent(in) :: fourier
+      type(element_motion), intent(inout) :: motion
+      type(path_room), intent(inout) :: path
+      real(wp), intent(inout), contiguous :: jacobian(:, :)
+
+      jacobian = 0.0_wp
+      call settle(element, motion, path, element%n_state, element%n_in, .true., path%state, &
+                  path%slope, path%by_motion, path%carried)
+      if (motion%status /= 0) return
+      call collect(element, fourier, motion, path, element%n_state, element%n_in, path%slope, &
+                   path%by_motion, path%carried, jacobian)
+   end subroutine differentiate_element
+
+   !> States of the turn that repeats; of it slopes and derivatives of the state before it, where
+   !> these are wanted.
+   subroutine settle(element, motion, path, n, m, differentiates, state, slope, by_motion, carried)
+      type(user_element), intent(in) :: element
+      type(element_motion), intent(inout) :: motion
+      type(path_room), intent(in) :: path
+      !> States and inputs.
+      integer, intent(in) :: n, m
+      logical, intent(in) :: differentiates
+      real(wp), intent(inout) :: state(n, 0:motion%n_time)
+      real(wp), intent(inout) :: slope(n + 4*m, n + m, 0:motion%n_time)
+      real(wp), intent(inout), dimension(n, m*path%n_coefficients) :: by_motion, carried
+      real(wp) :: change(n), last, apart, inverse(n, n)
+      integer :: turn
+      logical :: done, wants
+
+      call strain(element, motion, n, m, differentiates, state(:, 0), slope(:, :, 0))
+      if (motion%status /= 0) return
+      if (differentiates) then
+         by_motion = 0.0_wp
+         call carry(path, motion, n, m, 0, slope(:, :, 0), by_motion)
+      end if
+      apart = huge(1.0_wp)
+      do turn = 1, plain_turns + newton_steps
+         wants = differentiates .or. turn > plain_turns
+         call march(element, motion, n, m, wants, state, slope)
+         if (motion%status /= 0) return
+         change = state(:, motion%n_time) - state(:, 0)
+         last = apart
+         apart = share_of(change, state)
+         done = apart <= repeated .or. (turn > plain_turns .and. apart <= nearly_repeated .and. &
+                                        apart >= 0.5_wp*last)
+         if (done .and. .not. differentiates) return
+         if (wants) call invert(n, m, motion%n_time, state, slope, inverse)
+         if (differentiates) then
+            carried = by_motion
+            call carry_all(path, motion, n, m, slope, carried)
+            if (done .or. turn > plain_turns) then
+               by_motion = by_motion + matmul(inverse, carried - by_motion)
+            else
+               by_motion = carried
+            end if
+         end if
+         if (done) return
+         if (turn > plain_turns) change = matmul(inverse, change)
+         state(:, 0) = state(:, 0) + change
+      end do
+      motion%status = not_settled
+      motion%instant = 1
+   end subroutine settle
+
+   !> Change of the states over a turn, each over the largest value that it takes.
+   pure real(wp) function share_of(change, state) result(share)
+      real(wp), intent(in) :: change(:), state(:, :)
+      integer :: i
+
+      share = 0.0_wp
+      do i = 1, size(change)
+         if (abs(change(i)) > 0.0_wp) share = max(share, abs(change(i))/maxval(abs(state(i, :))))
+      end do
+   end function share_of
+
+   !> From the unstrained element to the motion where the first step begins.
+   subroutine strain(element, motion, n, m, wants, state, slope)
+      type(user_element), intent(in) :: element
+      type(element_motion), intent(inout) :: motion
+      integer, intent(in) :: n, m
+      logical, intent(in) :: wants
+      real(wp), intent(out) :: state(n)
+      real(wp), intent(inout) :: slope(n + 4*m, n + m)
+      real(wp) :: u(m, 2), v(m, 2), tau(2), after(n + m)
+      integer :: last
+
+      last = motion%n_time
+      u(:, 1) = 0.0_wp
+      v(:, 1) = 0.0_wp
+      u(:, 2) = motion%u(:m, last)
+      v(:, 2) = motion%v(:m, last)
+      tau(2) = -2.0_wp*pi/last
+      tau(1) = 2.0_wp*tau(2)
+      call one_step(element, motion, last, n, m, tau, u, v, wants, element%start, after, slope)
+      state = after(:n)
+   end subroutine strain
+
+   !> One turn.
+   subroutine march(element, motion, n, m, wants, state, slope)
+      type(user_element), intent(in) :: element
+      type(element_motion), intent(inout) :: motion
+      integer, intent(in) :: n, m
+      logical, intent(in) :: wants
+      real(wp), intent(inout) :: state(n, 0:motion%n_time)
+      real(wp), intent(inout) :: slope(n + 4*m, n + m, 0:motion%n_time)
+      real(wp) :: u(m, 2), v(m, 2), tau(2), after(n + m)
+      integer :: before, k
+
+      motion%force = 0.0_wp
+      do k = 1, motion%n_time
+         before = merge(motion%n_time, k - 1, k == 1)
+         u(:, 1) = motion%u(:m, before)
+         u(:, 2) = motion%u(:m, k)
+         v(:, 1) = motion%v(:m, before)
+         v(:, 2) = motion%v(:m, k)
+         tau(2) = motion%tau(k)
+         tau(1) = tau(2) - 2.0_wp*pi/motion%n_time
+         call one_step(element, motion, k, n, m, tau, u, v, wants, state(:, k - 1), after, &
+                       slope(:, :, k))
+         if (motion%status /= 0) return
+         state(:, k) = after(:n)
+         motion%force(:m, k) = after(n + 1:)
+      end do
+   end subroutine march
+
+   !> A step, with slopes that are given or by differences.
+   subroutine one_step(element, motion, k, n, m, tau, u, v, wants, state, after, slope)
+      type(user_element), intent(in) :: element
+      type(element_motion), intent(inout) :: motion
+      integer, intent(in) :: k, n, m
+      real(wp), intent(in) :: tau(2)
+      real(wp), intent(inout) :: u(m, 2), v(m, 2)
+      logical, intent(in) :: wants
+      real(wp), intent(in) :: state(n)
+      real(wp), intent(out) :: after(n + m)
+      real(wp), intent(inout) :: slope(n + 4*m, n + m)
+
+      motion%instant = k
+      call element%ask_step(motion%omega, tau, u, v, wants .and. element%has_derivative, state, &
+                            after, slope, motion%status)
+      if (motion%status /= 0 .or. .not. wants .or. element%has_derivative) return
+      call step_slopes(element, motion%omega, tau, u, v, state, relative_step, scales(), slope, &
+                       motion%status)
+
+   contains
+
+      !> Sizes of the inputs of a step, 1 where there is none.
+      function scales() result(size_of)
+         real(wp) :: size_of(n + 4*m)
+         integer :: j
+
+         size_of(:n) = max(maxval(abs(state)), maxval(abs(after(:n))))
+         do j = 1, m
+            size_of([n + j, n + 2*m + j]) = maxval(abs(motion%u(j, :)))
+            size_of([n + m + j, n + 3*m + j]) = maxval(abs(motion%v(j, :)))
+         end do
+         where (.not. size_of > 0.0_wp) size_of = 1.0_wp
+      end function scales
+
+   end subroutine one_step
+
+   !> Slopes by the displacements (force, displacement), where one step has brought the unstrained
+   !> element to a position at rest.
+   subroutine slopes_of_step(element, y, slope)
+      type(user_element), intent(in) :: element
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(out) :: slope(:, :)
+      real(wp) :: after(element%n_state + size(y)), tau(2)
+      real(wp), dimension(size(y), 2) :: u, v
+      real(wp) :: by(element%n_state + 4*size(y), element%n_state + size(y)), scale(size(by, 1))
+      integer :: m, n, status
+
+      n = element%n_state
+      m = size(y)
+      slope = 0.0_wp
+      tau = [0.0_wp, 2.0_wp*pi]
+      u(:, 1) = 0.0_wp
+      u(:, 2) = y
+      v = 0.0_wp
+      by = 0.0_wp
+      if (element%has_derivative) then
+         call element%ask_step(1.0_wp, tau, u, v, .true., element%start, after, by, status)
+      else
+         scale = maxval(abs(y))
+         if (.not. maxval(scale) > 0.0_wp) scale = 1.0_wp
+         call step_slopes(element, 1.0_wp, tau, u, v, element%start, relative_step, &
+                          scale, by, status)
+      end if
+      if (status == 0) slope = transpose(by(n + 2*m + 1:n + 3*m, n + 1:))
+   end subroutine slopes_of_step
+
+   !> Central differences of a step.
+   subroutine step_slopes(element, omega, tau, u, v, state, relative, scale, slope, status)
+      type(user_element), intent(in) :: element
+      real(wp), intent(in) :: omega
+      real(wp), intent(in) :: tau(:), u(:, :), v(:, :), state(:)
+      !> Of the steps, over the scales of (state, u, v before, u, v after).
+      real(wp), intent(in) :: relative, scale(:)
+      !> As of `ask_step`.
+      real(wp), intent(inout) :: slope(:, :)
+      integer, intent(out) :: status
+      real(wp), dimension(size(slope, 2)) :: ahead, behind
+      real(wp) :: none(size(slope, 1), size(slope, 2))
+      real(wp), dimension(size(u, 1), 2) :: u_at, v_at
+      real(wp) :: state_at(size(state)), shift
+      integer :: j
+
+      do j = 1, size(scale)
+         shift = relative*scale(j)
+         call at(shift)
+         call element%ask_step(omega, tau, u_at, v_at, .false., state_at, ahead, none, status)
+         if (status /= 0) return
+         call at(-shift)
+         call element%ask_step(omega, tau, u_at, v_at, .false., state_at, behind, none, status)
+         if (status /= 0) return
+         slope(j, :) = 0.5_wp*(ahead - behind)/shift
+      end do
+
+   contains
+
+      subroutine at(by)
+         real(wp), intent(in) :: by
+         integer :: i, m
+
+         m = size(u, 1)
+         state_at = state
+         u_at = u
+         v_at = v
+         i = j - size(state)
+         if (i <= 0) then
+            state_at(j) = state_at(j) + by
+         else if (i <= m) then
+            u_at(i, 1) = u_at(i, 1) + by
+         else if (i <= 2*m) then
+            v_at(i - m, 1) = v_at(i - m, 1) + by
+         else if (i <= 3*m) then
+            u_at(i - 2*m, 2) = u_at(i - 2*m, 2) + by
+         else
+            v_at(i - 3*m, 2) = v_at(i - 3*m, 2) + by
+         end if
+      end subroutine at
+
+   end subroutine step_slopes
+
+   !> Derivatives of the state by coefficients through step k (0: the strain).
+   subroutine carry(path, motion, n, m, k, slope, by_motion)
+      type(path_room), intent(in) :: path
+      type(element_motion), intent(in) :: motion
+      integer, intent(in) :: n, m, k
+      real(wp), intent(in) :: slope(n + 4*m, n + m)
+      real(wp), intent(inout) :: by_motion(n, m, path%n_coefficients)
+      real(wp) :: column(n)
+      integer :: c, i, j
+
+      do c = 1, path%n_coefficients
+         do j = 1, m
+            do i = 1, n
+               column(i) = dot_product(slope(:n, i), by_motion(:, j, c)) + &
+                           by_inputs(path, motion%omega, n, m, k, j, c, slope(:, i))
+            end do
+            by_motion(:, j, c) = column
+         end do
+      end do
+   end subroutine carry
+
+   !> What coefficient c of input j gives through the motion at both ends of step k.
+   pure real(wp) function by_inputs(path, omega, n, m, k, j, c, slope) result(value)
+      type(path_room), intent(in) :: path
+      real(wp), intent(in) :: omega
+      integer, intent(in) :: n, m, k, j, c
+      real(wp), intent(in) :: slope(:)
+      integer :: after, before
+
+      after = merge(path%n_time, k, k == 0)
+      value = slope(n + 2*m + j)*path%wave(c, after) + omega*slope(n + 3*m + j)*path%rate(c, after)
+      if (k == 0) return
+      before = merge(path%n_time, k - 1, k == 1)
+      value = value + slope(n + j)*path%wave(c, before) + &
+              omega*slope(n + m + j)*path%rate(c, before)
+   end function by_inputs
+
+   !> Through a whole turn.
+   subroutine carry_all(path, motion, n, m, slope, by_motion)
+      type(path_room), intent(in) :: path
+      type(element_motion), intent(in) :: motion
+      integer, intent(in) :: n, m
+      real(wp), intent(in) :: slope(n + 4*m, n + m, 0:motion%n_time)
+      real(wp), intent(inout) :: by_motion(n, m*path%n_coefficients)
+      integer :: k
+
+      do k = 1, motion%n_time
+         call carry(path, motion, n, m, k, slope(:, :, k), by_motion)
+      end do
+   end subroutine carry_all
+
+   !> Derivatives of the forces over the turn that repeats, and of their coefficients.
+   subroutine collect(element, fourier, motion, path, n, m, slope, by_motion, carried, jacobian)
+      type(user_element), intent(in) :: element
+      type(fourier_type), intent(in) :: fourier
+      type(element_motion), intent(in) :: motion
+      type(path_room), intent(in) :: path
+      integer, intent(in) :: n, m
+      real(wp), intent(in) :: slope(n + 4*m, n + m, 0:motion%n_time)
+      real(wp), intent(in) :: by_motion(n, m, path%n_coefficients)
+      real(wp), intent(inout) :: carried(n, m, path%n_coefficients)
+      real(wp), intent(inout), contiguous :: jacobian(:, :)
+      real(wp) :: value
+      integer :: c, i, j, k, nc
+
+      nc = path%n_coefficients
+      carried = by_motion
+      do k = 1, motion%n_time
+         do i = 1, element%n_in
+            do j = 1, m
+               do c = 1, nc
+                  value = dot_product(slope(:n, n + i, k), carried(:, j, c)) + &
+                          by_inputs(path, motion%omega, n, m, k, j, c, slope(:, n + i, k))
+                  jacobian((j - 1)*nc + c, (i - 1)*nc + 1:i*nc) = &
+                     jacobian((j - 1)*nc + c, (i - 1)*nc + 1:i*nc) + value*fourier%analysis(:, k)
+               end do
+            end do
+         end do
+         call carry(path, motion, n, m, k, slope(:, :, k), carried)
+      end do
+   end subroutine collect
+
+   !> Inverse of I - M, of a turn, on what does not stay as it is: by its singular values, which
+   !> rotations of its columns give (Hestenes).
+   subroutine invert(n, m, n_time, state, slope, inverse)
+      integer, intent(in) :: n, m, n_time
+      real(wp), intent(in) :: state(n, 0:n_time)
+      real(wp), intent(in) :: slope(n + 4*m, n + m, 0:n_time)
+      real(wp), intent(out) :: inverse(n, n)
+      real(wp), dimension(n, n) :: turn, left, right
+      real(wp) :: length, scale(n)
+      integer :: i, k
+
+      ! States may have different units.
+      scale = maxval(abs(state), dim=2)
+      where (.not. scale > 0.0_wp) scale = 1.0_wp
+      turn = 0.0_wp
+      do i = 1, n
+         turn(i, i) = 1.0_wp
+      end do
+      right = turn
+      do k = 1, n_time
+         turn = matmul(transpose(slope(:n, :n, k)), turn)
+      end do
+      do i = 1, n
+         left(:, i) = right(:, i) - turn(:, i)*scale(i)/scale
+      end do
+      call rotate(n, left, right)
+      inverse = 0.0_wp
+      do i = 1, n
+         length = norm2(left(:, i))
+         if (length <= singular) cycle
+         do k = 1, n
+            inverse(:, k) = inverse(:, k) + scale*right(:, i)*left(k, i)/(length**2*scale(k))
+         end do
+      end do
+   end subroutine invert
+
+   !> Columns at right angles to each other, by rotations that are gathered.
+   pure subroutine rotate(n, a, gathered)
+      integer, intent(in) :: n
+      real(wp), intent(inout), dimension(n, n) :: a, gathered
+      integer, parameter :: most_sweeps = 40
+      real(wp) :: along, c, s, t, x, column(n)
+      integer :: i, j, sweep
+      logical :: turned
+
+      do sweep = 1, most_sweeps
+         turned = .false.
+         do i = 1, n - 1
+            do j = i + 1, n
+               along = dot_product(a(:, i), a(:, j))
+               if (abs(along) <= epsilon(1.0_wp)*norm2(a(:, i))*norm2(a(:, j))) cycle
+               turned = .true.
+               x = (dot_product(a(:, j), a(:, j)) - dot_product(a(:, i), a(:, i)))/(2.0_wp*along)
+               t = sign(1.0_wp, x)/(abs(x) + sqrt(1.0_wp + x**2))
+               c = 1.0_wp/sqrt(1.0_wp + t**2)
+               s = c*t
+               column = a(:, i)
+               a(:, i) = c*column - s*a(:, j)
+               a(:, j) = s*column + c*a(:, j)
+               column = gathered(:, i)
+               gathered(:, i) = c*column - s*gathered(:, j)
+               gathered(:, j) = s*column + c*gathered(:, j)
+            end do
+         end do
+         if (.not. turned) exit
+      end do
+   end subroutine rotate
+
+end module fw_user_path
