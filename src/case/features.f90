@@ -16,7 +16,7 @@ module fw_features
    use fw_resonance_options, only: condition_phase
    use fw_solver_options, only: continuation_arclength, jacobian_analytic, scheme_bdf, &
       scheme_implicit_euler, scheme_runge_kutta, solver_newton, solver_pseudo_time
-   use fw_wear_options, only: wear_pseudo_time
+   use fw_wear_options, only: mu_by_none, wear_pseudo_time
    implicit none (type, external)
    private
 
@@ -197,6 +197,9 @@ contains
       if (pairs) facts = facts_of(case%contact)
       known = .true.
       select case (phrase)
+      case ('a pair without a normal dof')
+         asked = .false.
+         if (pairs) asked = any(case%contact%side_1(3, :) == 0 .and. case%contact%side_2(3, :) == 0)
       case ('a case without contact pairs')
          asked = .not. pairs
       case ("contact%memory = 'carried'")
@@ -247,6 +250,8 @@ contains
          asked = case%analysis == analysis_wear .and. case%wear%follow_resonance
       case ('group &mission')
          asked = case%mission%is_wanted()
+      case ("wear%mu_by other than 'none'")
+         asked = case%wear%mu_by /= mu_by_none
       case ('wear%n_cycles')
          asked = case%wear%n_cycles < huge(1.0_wp)
       case ('wear%check_steps = .true.')

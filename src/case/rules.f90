@@ -189,6 +189,11 @@ module fw_rules
       rule_type('wear%error_tolerance', "wear by pseudo_time%scheme = 'implicit_euler'", &
                 'it estimates no error: give wear%max_depth_step, or use '// &
                 "'rosenbrock' or 'bdf'"), &
+      rule_type("wear%mu_by other than 'none'", "case%analysis other than 'wear'", &
+                "use 'wear'"), &
+      rule_type("wear%mu_by other than 'none'", 'a pair without a normal dof', &
+                'give it one, which a static load presses'), &
+      rule_type("wear%mu_by other than 'none'", 'sweep%stability = .true.', 'leave it out'), &
       rule_type('group &mission', "case%analysis other than 'wear'", "use 'wear'"), &
       rule_type('group &mission', 'wear%n_cycles', 'mission%cycles has those of each block'), &
       rule_type('group &mission', &

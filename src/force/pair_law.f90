@@ -2,10 +2,11 @@
 !> either constant or from the distance of the two sides.
 module fw_pair_law
    use fw_contact_data, only: contact_type
-   use fw_force_law, only: force_law
+   use fw_force_law, only: force_law, force_workspace
    use fw_key, only: key, key_type, key_visitor
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
+   use fw_worn_friction, only: worn_friction
    implicit none (type, external)
    private
 
@@ -14,6 +15,8 @@ module fw_pair_law
    type, abstract, extends(force_law) :: pair_law
       !> Friction coefficient (n_elements).
       real(wp), allocatable :: mu(:)
+      !> How it changes with wear; not allocated where it does not.
+      type(worn_friction), allocatable :: worn
       !> Whether a pair has two tangential directions.
       logical :: two_directions = .false.
    contains
@@ -23,6 +26,8 @@ module fw_pair_law
       procedure :: take_facts
       procedure :: take_pairs
       procedure :: slope_at_rest
+      procedure :: set_friction
+      procedure :: take_friction
       procedure :: located
    end type pair_law
 
@@ -40,6 +45,7 @@ contains
          return
       end if
       call self%take_pairs(contact%mu, present)
+      if (allocated(contact%worn_friction)) self%worn = contact%worn_friction
       associate (p => self%prediction)
          p%scale = contact%penalty_scale
          p%gap = contact%gap
@@ -100,6 +106,24 @@ contains
       self%mu = mu
       self%two_directions = any(present(2, :))
    end subroutine take_pairs
+
+   !> The friction of pairs at their depths.
+   pure subroutine set_friction(self, depth, work)
+      class(pair_law), intent(in) :: self
+      real(wp), intent(in) :: depth(:)
+      type(force_workspace), intent(inout) :: work
+
+      if (.not. allocated(self%worn)) return
+      call self%worn%at_depth(self%mu, depth, work%mu, work%mu_growth)
+   end subroutine set_friction
+
+   !> Before an evaluation: friction that does not wear is that of the law.
+   pure subroutine take_friction(self, work)
+      class(pair_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+
+      if (.not. allocated(self%worn)) work%mu = self%mu
+   end subroutine take_friction
 
    !> A pair without friction or load holds nothing tangentially.
    pure real(wp) function slope_at_rest(self, element, component) result(slope)

@@ -4,10 +4,12 @@ module fw_quantity_conditions
    use fw_kinds, only: wp
    use fw_parameters, only: harmonic_scale
    use fw_solver_options, only: continuation_arclength
+   use fw_wear_options, only: mu_by_none
    implicit none (type, external)
    private
 
-   public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
+   public :: always, asks_stability, changes_friction, follows_branch, follows_frequency, &
+             follows_parameter, &
              goes_over, has_levels, is_accurate, is_controlled, is_mission, is_mode, is_response, &
              scales_load, shows_contact, wears
 
@@ -106,6 +108,13 @@ contains
 
       is_mission = wears(case) .and. case%mission%is_wanted()
    end function is_mission
+
+   !> Wear that changes friction.
+   pure logical function changes_friction(case)
+      type(case_type), intent(in) :: case
+
+      changes_friction = wears(case) .and. case%wear%mu_by /= mu_by_none
+   end function changes_friction
 
    pure logical function wears(case)
       type(case_type), intent(in) :: case
