@@ -8,6 +8,7 @@ module fw_several_laws
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
+   use fw_worn_friction, only: worn_friction
    implicit none (type, external)
    private
 
@@ -90,6 +91,7 @@ contains
             self%of_member(at) = m
             self%place(at) = [(i, i=1, size(at))]
             self%mu(at) = law%mu
+            if (allocated(law%worn)) call take_worn(self, at, law%worn)
             self%prediction%stiffness(at, :) = law%prediction%stiffness
             self%prediction%gap(at) = law%prediction%gap
             self%prediction%load(at) = law%prediction%load
@@ -108,6 +110,22 @@ contains
       end associate
       call find_facts(self)
    end subroutine join
+
+   !> How the friction of some pairs changes: that of all has the same form.
+   subroutine take_worn(self, at, worn)
+      class(several_laws), intent(inout) :: self
+      integer, intent(in) :: at(:)
+      type(worn_friction), intent(in) :: worn
+
+      if (.not. allocated(self%worn)) then
+         allocate (self%worn)
+         self%worn%form = worn%form
+         allocate (self%worn%final(self%n_elements), self%worn%rate(self%n_elements), &
+                   source=0.0_wp)
+      end if
+      self%worn%final(at) = worn%final
+      self%worn%rate(at) = worn%rate
+   end subroutine take_worn
 
    subroutine find_facts(self)
       class(several_laws), intent(inout) :: self
@@ -219,6 +237,7 @@ contains
       type(force_workspace), intent(inout) :: work
       integer :: m
 
+      call self%take_friction(work)
       select type (room => work%room)
       type is (members_room)
          do m = 1, size(self%member)
@@ -240,6 +259,7 @@ contains
 
       own%prediction = work%prediction(at, :, :)
       own%offset = work%offset(at)
+      own%mu = work%mu(at)
       own%mean = work%mean(at, :)
       own%x_start = work%x_start(at, :)
       own%rate = work%rate

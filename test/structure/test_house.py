@@ -13,9 +13,9 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (97400, 1000),
-    "files of src": (429, 10),
-    "lines of the longest file": (774, 50),
+    "lines of src": (97900, 1000),
+    "files of src": (430, 10),
+    "lines of the longest file": (782, 50),
     "modules used by one file, at most": (32, 2),
     "files that name forces%pairs": (42, 0),
     "files that name case_type": (58, 0),
