@@ -68,6 +68,7 @@ UNITS: dict[str, str] = {
     "solver%max_seconds": "s",
     "wear%coefficient": "L^2/F",
     "wear%max_depth_step": "L",
+    "wear%mu_scale": "L or F L",
     "mode%near": "unit",
     "mode%amplitudes": "L",
     "mode%start": "L",
@@ -616,6 +617,14 @@ class Wear(TypedDict, total=False):
     max_steps: int
     #: run once more with halved steps, to see how far the profile moves (default: .false.)
     check_steps: bool
+    #: whether friction changes with the depth, or with the friction energy of its pair (default:
+    #: 'none')
+    mu_by: Literal["none", "depth", "energy"]
+    #: friction coefficient that wear leads to; only: mu_by (required with mu_by)
+    mu_final: ArrayLike
+    #: [L or F L] depth or energy after which 1/e of the change is left; only: mu_by (required with
+    #: mu_by)
+    mu_scale: ArrayLike
     #: keep the frequency at the peak of the first observed quantity (default: .false.)
     follow_resonance: bool
 

@@ -323,7 +323,7 @@ contains
       allocate (self%near(problem%forces%n_laws), self%acting(problem%forces%n_laws))
       self%has_large_blocks = blocks_are_large(problem)
       self%nearly = offers_nearly(self)
-      if (problem%structure%n_alike > 1) call self%preconditioner%reserve_waves( &
+      if (problem%structure%n_alike > 1) call self%preconditioner%around%reserve( &
          problem%structure%n_slots, problem%structure%n_alike, problem%fourier%n_retained)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)
    end subroutine new_balance_state

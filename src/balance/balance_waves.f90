@@ -77,7 +77,7 @@ contains
             matrix(:, j) = zero
             matrix(j, j) = held(j)
          end do
-         associate (factors => self%preconditioner%wave(k + 1, h))
+         associate (factors => self%preconditioner%around%wave(k + 1, h))
             call factors%reserve(m, maxval([(abs(stiffness(j, j)), j=1, m)]))
             factors%matrix(:m, :m) = cmplx(factors%scale*matrix, kind=kind(factors%matrix))
             call factors%factor()
@@ -95,7 +95,7 @@ contains
 
       r = self%problem%structure%n_own()
       n = self%problem%structure%n_alike
-      associate (own => self%preconditioner%own(h), structure => self%problem%structure)
+      associate (own => self%preconditioner%around%own(h), structure => self%problem%structure)
          own%is_there = r > 0 .and. n*r <= sizes%whole_sectors
          if (.not. own%is_there) return
          if (.not. allocated(own%matrix)) allocate (own%matrix(n*r, n*r), own%pivot(n*r), &
@@ -107,7 +107,7 @@ contains
             call structure%own_rows(k, rows)
             do a = 1, r
                answer(:, a) = conjg(rows(a, :))
-               call self%preconditioner%wave(k + 1, h)%solve(answer(:, a))
+               call self%preconditioner%around%wave(k + 1, h)%solve(answer(:, a))
             end do
             wave(:, :, k + 1) = matmul(rows, answer)
          end do
@@ -140,7 +140,7 @@ contains
       integer :: info, j, m, n, r
 
       n = self%problem%structure%n_alike
-      associate (own => self%preconditioner%own(h), factors => self%preconditioner, &
+      associate (own => self%preconditioner%around%own(h), factors => self%preconditioner%around, &
                  structure => self%problem%structure)
          r = size(own%rows, 1)
          m = n*r
@@ -310,7 +310,7 @@ contains
    module procedure solve_waves
       integer :: j
 
-      associate (in => self%scratch%complex_in(:, h), factors => self%preconditioner, &
+      associate (in => self%scratch%complex_in(:, h), factors => self%preconditioner%around, &
                  structure => self%problem%structure)
          factors%sectors(:, :, h) = zero
          do j = 1, self%active%n_active

@@ -4,17 +4,11 @@ module fw_kept_factors
    use fw_kinds, only: wp
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_split_factors, only: split_factors
+   use fw_wave_factors, only: wave_factors
    implicit none (type, external)
    private
 
    public :: kept_factors
-
-   !> Factors of I + Gamma D of a harmonic (fw_balance_waves), and scratch.
-   type :: own_factors
-      logical :: is_there = .false.
-      complex(wp), allocatable :: matrix(:, :), block(:, :, :), rows(:, :), force(:)
-      integer, allocatable :: pivot(:)
-   end type own_factors
 
    type :: kept_factors
       type(preconditioner_lu_type), allocatable :: harmonic(:)
@@ -23,12 +17,8 @@ module fw_kept_factors
       logical :: is_split = .false.
       !> Whether these are used although there are those of waves.
       logical :: is_whole = .false.
-      !> Of waves around equal sectors in their place (n_sectors, n_retained), with scratch (slots
-      !> of a sector, n_sectors, n_retained).
-      type(preconditioner_lu_type), allocatable :: wave(:, :)
-      complex(wp), allocatable :: sectors(:, :, :), waves(:, :, :), answer(:, :, :)
-      !> Of what sectors have beside each other (n_retained).
-      type(own_factors), allocatable :: own(:)
+      !> Of waves around equal sectors, in their place.
+      type(wave_factors) :: around
       !> Coordinates for which they were built (first n entries).
       integer :: n = 0
       integer, allocatable :: coordinate(:)
@@ -44,7 +34,6 @@ module fw_kept_factors
       real(wp), allocatable :: unknown_stiffness(:)
    contains
       procedure :: reserve
-      procedure :: reserve_waves
    end type kept_factors
 
 contains
@@ -58,16 +47,5 @@ contains
                 self%from(n_coordinates), source=0)
       allocate (self%unknown_stiffness(n_coordinates), source=0.0_wp)
    end subroutine reserve
-
-   !> Of equal sectors, beside the rest.
-   pure subroutine reserve_waves(self, n_slots, n_sectors, n_harmonics)
-      class(kept_factors), intent(inout) :: self
-      integer, intent(in) :: n_slots, n_sectors, n_harmonics
-
-      allocate (self%wave(n_sectors, n_harmonics), self%own(n_harmonics))
-      allocate (self%sectors(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
-      allocate (self%waves(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
-      allocate (self%answer(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
-   end subroutine reserve_waves
 
 end module fw_kept_factors

@@ -118,6 +118,8 @@ module fw_point
       !> Of a step of wear: cycles so far, depth [length] and depth per cycle (n_pairs).
       real(wp) :: cycles = 0.0_wp
       real(wp), allocatable :: depth(:), wear_rate(:)
+      !> Friction coefficients at these depths, where they change with them (n_pairs).
+      real(wp), allocatable :: worn_mu(:)
       !> Of a mission: flights begun so far and the block, 0 before the first.
       integer :: flight = 0, block = 0
       !> Friction energy that the worn depth stands for (n_pairs) [force * length], and the worn

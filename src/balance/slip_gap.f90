@@ -202,7 +202,7 @@ contains
          end if
          select type (law => list%entry(list%pairs)%law)
          class is (pair_law)
-            limit_force = law%mu(i)*max(limit_force, 0.0_wp)
+            limit_force = law%friction_of(i, system%work(list%pairs))*max(limit_force, 0.0_wp)
          end select
       end associate
    end function normal_load

@@ -15,8 +15,8 @@
 !>   up to 3e-3 where friction switches between the steps.
 !> * A pair that sticks throughout could rest anywhere within its cone, a multiplier of exactly 1
 !>   that is left out.
-!> * Laws that act at once, smooth friction and curved pressures, are marched as well: slopes by
-!>   displacements and velocities at every instant.
+!> * Laws that act at once, smooth friction and curved pressures, are marched as well, and so are
+!>   dampers and polynomials: slopes by displacements and velocities at every instant.
 !> * Rigid contact (dlft, dlft_velocity) has no derivative in time: refused.
 module fw_stability
    use fw_error, only: error_type, fatal_error, status_input
@@ -83,7 +83,7 @@ contains
       n_harmonics = chosen_harmonics(system, basis)
       call check_static(system, basis, history, error)
       if (allocated(error)) return
-      marches = n_harmonics == 0 .or. history%acts_at_once .or. &
+      marches = n_harmonics == 0 .or. history%acts_at_once .or. size(history%elements) > 0 .or. &
                 any([(history%rubs(i), i=1, system%problem%n_pairs)])
       if (present(marched)) marched = marches
       if (marches) then
@@ -128,26 +128,48 @@ contains
       type(perturbation_basis), intent(in) :: basis
       type(history_type), intent(in) :: history
       type(error_type), allocatable, intent(out) :: error
-      !> Part of a row that round-off leaves.
-      real(wp), parameter :: negligible = 1.0e-9_wp
-      integer :: c, i, row
+      integer :: c, i, k, row
 
-      if (.not. history%acts_at_once) return
-      associate (nd => basis%n_massive + basis%n_damped)
-         do i = 1, system%problem%n_pairs
-            do c = 1, 2
-               row = system%problem%joint%row(c, i)
-               if (row == 0 .or. history%law%prediction%order_of(i, c) == 0) cycle
-               if (norm2(basis%direction(nd + 1:, row)) <= &
-                   negligible*norm2(basis%direction(:, row))) cycle
-               call fatal_error(error, '&sweep stability: pair '//to_text(i)//' rubs, by a law '// &
-                                'of velocities, on a dof without mass and damping; give it '// &
+      do k = 1, size(history%elements)
+         do i = 1, size(history%elements(k)%row, 2)
+            if (.not. any(abs(history%elements(k)%by_v(:, :, i, :)) > 0.0_wp)) cycle
+            do c = 1, size(history%elements(k)%row, 1)
+               if (.not. moves_static(basis, history%elements(k)%row(c, i))) cycle
+               call fatal_error(error, '&sweep stability: element '//to_text(i)//' of &damper '// &
+                                'acts on a dof without mass and other damping; give it '// &
                                 'either, or switch stability off', status_input)
                return
             end do
          end do
-      end associate
+      end do
+      if (.not. history%acts_at_once) return
+      do i = 1, system%problem%n_pairs
+         do c = 1, 2
+            row = system%problem%joint%row(c, i)
+            if (row == 0 .or. history%law%prediction%order_of(i, c) == 0) cycle
+            if (.not. moves_static(basis, row)) cycle
+            call fatal_error(error, '&sweep stability: pair '//to_text(i)//' rubs, by a law '// &
+                             'of velocities, on a dof without mass and damping; give it '// &
+                             'either, or switch stability off', status_input)
+            return
+         end do
+      end do
    end subroutine check_static
+
+   !> Whether a row has a part in directions without mass and damping.
+   pure logical function moves_static(basis, row) result(moves)
+      type(perturbation_basis), intent(in) :: basis
+      !> Of the joint; 0: none.
+      integer, intent(in) :: row
+      !> Part of a row that round-off leaves.
+      real(wp), parameter :: negligible = 1.0e-9_wp
+
+      moves = .false.
+      if (row == 0) return
+      associate (nd => basis%n_massive + basis%n_damped)
+         moves = norm2(basis%direction(nd + 1:, row)) > negligible*norm2(basis%direction(:, row))
+      end associate
+   end function moves_static
 
    !> Harmonics for Hill's method: those of the solution, and more where the eigenproblem stays
    !> small; 0 where it would be too large.

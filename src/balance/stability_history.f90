@@ -4,6 +4,7 @@ module fw_stability_history
    use fw_force_law, only: force_law, force_workspace, pair_mixed, pair_stuck
    use fw_fourier, only: fourier_type, new_fourier
    use fw_friction, only: elastic_friction
+   use fw_instant_law, only: element_motion, instant_law
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
@@ -16,6 +17,15 @@ module fw_stability_history
    !> Steps per period at least: the error of Newmark's rule is (w step)**2/12 of the phase.
    integer, parameter :: fewest_steps = 1024
    integer, parameter :: steps_per_harmonic = 32
+
+   !> Elements of several rows each, whose forces follow from displacements and velocities at the
+   !> same instant.
+   type :: element_slopes
+      !> Row of the joint, 0 where there is none (input, element).
+      integer, allocatable :: row(:, :)
+      !> (input, output, element, n_time) [force/length], [force time/length].
+      real(wp), allocatable :: by_u(:, :, :, :), by_v(:, :, :, :)
+   end type element_slopes
 
    type :: history_type
       integer :: n_time = 0
@@ -35,6 +45,10 @@ module fw_stability_history
       real(wp), allocatable :: by_displacement(:, :, :, :), by_velocity(:, :, :, :)
       !> Slopes of the other elements (as pointwise_row, n_time).
       real(wp), allocatable :: slope(:, :)
+      !> The groups of elements (0 without any), and whether forces of the motion follow its
+      !> velocities.
+      type(element_slopes), allocatable :: elements(:)
+      logical :: has_rates = .false.
    contains
       procedure :: rubs
       procedure :: derivatives
@@ -119,11 +133,8 @@ contains
       integer :: c, i, k, n
 
       self%acts_at_once = .true.
-      rates = 0.0_wp
-      do n = 1, (size(rows, 1) - 1)/2
-         rates(2*n, :) = n*system%frequency()*rows(2*n + 1, :)
-         rates(2*n + 1, :) = -n*system%frequency()*rows(2*n, :)
-      end do
+      self%has_rates = .true.
+      rates = rates_of(rows, system%frequency())
       u = matmul(transpose(fourier%synthesis), rows)
       v = matmul(transpose(fourier%synthesis), rates)
       n = size(self%row, 2)
@@ -153,6 +164,59 @@ contains
       end associate
    end subroutine differentiate_at_once
 
+   !> Coefficients of the velocities.
+   pure function rates_of(rows, omega) result(rates)
+      real(wp), intent(in) :: rows(:, :), omega
+      real(wp) :: rates(size(rows, 1), size(rows, 2))
+      integer :: n
+
+      rates = 0.0_wp
+      do n = 1, (size(rows, 1) - 1)/2
+         rates(2*n, :) = n*omega*rows(2*n + 1, :)
+         rates(2*n + 1, :) = -n*omega*rows(2*n, :)
+      end do
+   end function rates_of
+
+   !> Slopes of elements of several rows, or of velocities, along the period.
+   subroutine differentiate_elements(law, row, rows, omega, fourier, self)
+      class(instant_law), intent(in) :: law
+      !> (input, element)
+      integer, intent(in) :: row(:, :)
+      real(wp), intent(in) :: rows(:, :), omega
+      type(fourier_type), intent(in) :: fourier
+      type(element_slopes), intent(out) :: self
+      type(element_motion) :: motion
+      real(wp) :: rates(size(rows, 1), size(rows, 2))
+      integer :: c, i, n
+
+      n = size(row, 1)
+      self%row = row
+      allocate (self%by_u(n, n, size(row, 2), fourier%n_time), source=0.0_wp)
+      allocate (self%by_v, source=self%by_u)
+      rates = rates_of(rows, omega)
+      motion%n_time = fourier%n_time
+      motion%omega = omega
+      motion%wants_slopes = .true.
+      allocate (motion%u(n, fourier%n_time), motion%v(n, fourier%n_time), &
+                motion%force(n, fourier%n_time), motion%by_u(n, n, fourier%n_time), &
+                motion%by_v(n, n, fourier%n_time), source=0.0_wp)
+      do i = 1, size(row, 2)
+         motion%element = i
+         motion%u = 0.0_wp
+         motion%v = 0.0_wp
+         motion%by_u = 0.0_wp
+         motion%by_v = 0.0_wp
+         do c = 1, n
+            if (row(c, i) == 0) cycle
+            motion%u(c, :) = matmul(rows(:, row(c, i)), fourier%synthesis)
+            motion%v(c, :) = matmul(rates(:, row(c, i)), fourier%synthesis)
+         end do
+         call law%act(motion)
+         self%by_u(:, :, i, :) = motion%by_u
+         self%by_v(:, :, i, :) = motion%by_v
+      end do
+   end subroutine differentiate_elements
+
    !> Slopes of the laws other than that of the pairs.
    subroutine take_slopes(system, rows, fourier, self)
       class(balance_state), intent(in) :: system
@@ -161,16 +225,36 @@ contains
       type(history_type), intent(inout) :: self
       real(wp), allocatable :: elongation(:)
       integer :: i, k, n
+      logical :: of_elements(system%problem%forces%n_laws)
 
+      do k = 1, system%problem%forces%n_laws
+         select type (law => system%problem%forces%entry(k)%law)
+         class is (instant_law)
+            of_elements(k) = .true.
+         class default
+            of_elements(k) = .false.
+         end select
+      end do
+      allocate (self%elements(count(of_elements)))
+      n = 0
+      do k = 1, system%problem%forces%n_laws
+         select type (law => system%problem%forces%entry(k)%law)
+         class is (instant_law)
+            n = n + 1
+            call differentiate_elements(law, system%problem%forces%entry(k)%row, rows, &
+                                        system%frequency(), fourier, self%elements(n))
+            self%has_rates = self%has_rates .or. law%takes_rates
+         end select
+      end do
       allocate (self%pointwise_row(0))
       do k = 1, system%problem%forces%n_laws
-         if (k == system%problem%forces%pairs) cycle
+         if (k == system%problem%forces%pairs .or. of_elements(k)) cycle
          self%pointwise_row = [self%pointwise_row, system%problem%forces%entry(k)%row(1, :)]
       end do
       allocate (self%slope(size(self%pointwise_row), self%n_time))
       n = 0
       do k = 1, system%problem%forces%n_laws
-         if (k == system%problem%forces%pairs) cycle
+         if (k == system%problem%forces%pairs .or. of_elements(k)) cycle
          do i = 1, size(system%problem%forces%entry(k)%row, 2)
             n = n + 1
             elongation = matmul(rows(:, self%pointwise_row(n)), fourier%synthesis)
@@ -250,6 +334,9 @@ contains
       do i = 1, size(self%pointwise_row)
          by_u(self%pointwise_row(i), self%pointwise_row(i)) = self%slope(i, k)
       end do
+      do i = 1, size(self%elements)
+         call add_elements(self%elements(i), k, by_u, by_v)
+      end do
       if (self%acts_at_once) then
          call take_at_once(self, k, by_u, by_v)
          return
@@ -274,6 +361,26 @@ contains
          end if
       end do
    end subroutine derivatives
+
+   !> By the rows of the joint, which elements may share.
+   pure subroutine add_elements(self, k, by_u, by_v)
+      type(element_slopes), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(inout) :: by_u(:, :), by_v(:, :)
+      integer :: b, c, i
+
+      do i = 1, size(self%row, 2)
+         do c = 1, size(self%row, 1)
+            do b = 1, size(self%row, 1)
+               associate (out => self%row(c, i), in => self%row(b, i))
+                  if (out == 0 .or. in == 0) cycle
+                  by_u(out, in) = by_u(out, in) + self%by_u(b, c, i, k)
+                  by_v(out, in) = by_v(out, in) + self%by_v(b, c, i, k)
+               end associate
+            end do
+         end do
+      end do
+   end subroutine add_elements
 
    !> By the rows of the joint.
    pure subroutine take_at_once(self, k, by_u, by_v)

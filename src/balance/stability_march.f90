@@ -8,7 +8,7 @@
 !>   slip   df = mu p/|d| (I - e e^T)(dy - dx) - mu e dy_n,  dx = dy - df
 !>   open   df = 0,                                          dx = dy.
 !>
-!> Laws that act at once have no positions: df = df/du du + df/dv dv.
+!> Laws that act at once and other elements have no positions: df = df/du du + df/dv dv.
 !>
 !> Time steps follow Newmark's rule of constant mean acceleration (error h**2, no numerical
 !> damping), with backward Euler for massless damped directions: there the mean rule would ring.
@@ -167,7 +167,7 @@ contains
          deallocate (self%lu%matrix, self%lu%pivot)
       end if
       self%a = -force(:nb, :) - matmul(basis%damping(:nb, :nb), self%v)
-      if (history%acts_at_once) self%a = self%a - &
+      if (history%has_rates) self%a = self%a - &
          matmul(basis%direction(:nb, :), matmul(self%by_v, matmul( &
                 transpose(basis%direction(:nb, :)), self%v)))
    end subroutine settle
@@ -205,7 +205,7 @@ contains
                        matmul(basis%damping(:nb, :nb), 2.0_wp/h*y + v)
          ! Backward Euler: (y1 - y)/h + K y1 + f1 = 0.
          rhs(nb + 1:nd, :) = rhs(nb + 1:nd, :) + self%y(nb + 1:nd, :)/h
-         if (history%acts_at_once) call add_rates(basis, self, rhs)
+         if (history%has_rates) call add_rates(basis, self, rhs)
          call dgetrs('N', basis%n, size(rhs, 2), self%lu%matrix, basis%n, self%lu%pivot, rhs, &
                      basis%n, info)
          ! a before v: it needs the velocity at the begin of the step.

@@ -12,11 +12,12 @@ module fw_features
    use fw_kinds, only: wp
    use fw_law_text, only: law_text, law_text_length
    use fw_laws, only: facts_of, is_viscous
+   use fw_normal_law, only: curved_pairs
    use fw_parameters, only: harmonic_scale, loss_factor, rotation_speed, static_scale
    use fw_resonance_options, only: condition_phase
    use fw_solver_options, only: continuation_arclength, scheme_bdf, scheme_implicit_euler, &
       scheme_runge_kutta, solver_newton, solver_pseudo_time
-   use fw_wear_options, only: wear_pseudo_time
+   use fw_wear_options, only: mu_by_none, wear_pseudo_time
    implicit none (type, external)
    private
 
@@ -223,6 +224,12 @@ contains
       if (pairs) facts = facts_of(case%contact)
       known = .true.
       select case (phrase)
+      case ("contact%normal_law other than 'unilateral'")
+         asked = .false.
+         if (pairs) asked = any(curved_pairs(case%contact))
+      case ('a pair without a normal dof')
+         asked = .false.
+         if (pairs) asked = any(case%contact%side_1(3, :) == 0 .and. case%contact%side_2(3, :) == 0)
       case ('a case without contact pairs')
          asked = .not. pairs
       case ('group &base')
@@ -281,6 +288,8 @@ contains
          asked = case%analysis == analysis_wear .and. case%wear%follow_resonance
       case ('group &mission')
          asked = case%mission%is_wanted()
+      case ("wear%mu_by other than 'none'")
+         asked = case%wear%mu_by /= mu_by_none
       case ('wear%n_cycles')
          asked = case%wear%n_cycles < huge(1.0_wp)
       case ('wear%check_steps = .true.')

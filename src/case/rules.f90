@@ -188,8 +188,7 @@ module fw_rules
    !> Groups of elements that are neither pairs nor springs.
    type(rule_type), parameter :: of_elements(*) = [ &
       rule_type('elements beside pairs and springs', "case%analysis = 'time'", &
-                "use 'frf' or 'point'"), &
-      rule_type('elements beside pairs and springs', 'sweep%stability = .true.', 'leave it out')]
+                "use 'frf' or 'point'")]
 
    type(rule_type), parameter :: of_wear(*) = [ &
       rule_type("case%analysis = 'wear'", 'a case without contact pairs', &
@@ -202,6 +201,13 @@ module fw_rules
       rule_type('wear%error_tolerance', "wear by pseudo_time%scheme = 'implicit_euler'", &
                 'it estimates no error: give wear%max_depth_step, or use '// &
                 "'rosenbrock' or 'bdf'"), &
+      rule_type("wear%mu_by other than 'none'", "case%analysis other than 'wear'", &
+                "use 'wear'"), &
+      rule_type("wear%mu_by other than 'none'", 'a pair without a normal dof', &
+                'give it one, which a static load presses'), &
+      rule_type("wear%mu_by other than 'none'", "contact%normal_law other than 'unilateral'", &
+                "use 'unilateral'"), &
+      rule_type("wear%mu_by other than 'none'", 'sweep%stability = .true.', 'leave it out'), &
       rule_type('group &mission', "case%analysis other than 'wear'", "use 'wear'"), &
       rule_type('group &mission', 'wear%n_cycles', 'mission%cycles has those of each block'), &
       rule_type('group &mission', &

@@ -219,8 +219,9 @@ contains
                self%n_in_jump = 0
             end if
             n = wanted_flights(self, case)
-            ! With more flights to go it would be another jump.
-            is_cut = n < free_flights(self, case)
+            ! With more flights to go it would be another jump. The rest of a flight that is
+            ! continued is none: its first rows have been written as they are.
+            is_cut = now%block == 0 .and. n < free_flights(self, case)
             if (n > 1 .and. now%block == 0) then
                call jump(self, case, n, is_cut, error)
             else

@@ -106,6 +106,7 @@ contains
       point%cycles = state%cycles
       point%depth = state%x(n + 1:)
       point%wear_rate = state%rate
+      point%worn_mu = system%friction()
       point%wear_volume = patch_volumes(self%case%contact, point%depth)
       call add_energy(self, state, point%dissipation)
       point%wear_energy = self%energy

@@ -7,6 +7,7 @@ module fw_contact_data
    use fw_kinds, only: wp
    use fw_law_constants, only: law_constants
    use fw_text, only: string_type
+   use fw_worn_friction, only: worn_friction
    implicit none (type, external)
    private
 
@@ -60,6 +61,8 @@ module fw_contact_data
       type(law_constants) :: constants
       !> Multiplies the automatic penalty of the DLFT laws.
       real(wp) :: penalty_scale = 1.0_wp
+      !> How friction changes with the depth of wear.
+      type(worn_friction), allocatable :: worn_friction
       !> Where the march through the period starts.
       integer :: memory = memory_assembly
       !> Coordinates of the pairs, for pictures (3, n_pairs), and the names of their patches.

@@ -147,6 +147,9 @@ module fw_force_law
       !> Constant part of the input of the last component: stiffness times gap with the wear depth,
       !> or minus the dead load (n_elements).
       real(wp), allocatable :: offset(:)
+      !> Friction coefficient of pairs at their depth, and the part of it by which it changes with
+      !> that (n_elements) [-, 1/length].
+      real(wp), allocatable :: mu(:), mu_growth(:)
       !> Of a law of rates: what the mean position adds to the tangential inputs of an element that
       !> comes to rest, stiffness times the mean (n_elements, 2); a rate says nothing of it.
       real(wp), allocatable :: mean(:, :)
@@ -216,6 +219,7 @@ module fw_force_law
       procedure :: reserve
       procedure :: take_elements
       procedure :: set_offset
+      procedure :: set_friction
       procedure :: take_prediction
       procedure(evaluate_interface), deferred :: evaluate
       procedure :: evaluate_free
@@ -279,6 +283,7 @@ contains
       allocate (self%input(n_components*fourier%n_coefficients, n), source=0.0_wp)
       allocate (self%output, source=self%input)
       allocate (self%offset(n), self%scale(n), self%drift(n), self%pressure(n), source=0.0_wp)
+      allocate (self%mu(n), self%mu_growth(n), source=0.0_wp)
       allocate (self%x_start(n, 2), self%x(n, 2), self%mean(n, 2), source=0.0_wp)
       allocate (self%rests(n), self%linear_rests(n), source=.false.)
       allocate (self%turns(n), source=0)
@@ -450,6 +455,7 @@ contains
    end function grows
 
    !> The constant part of the inputs, before evaluations at `work%rate`.
+   !> The constant part of the inputs, before evaluations, and what wear does to friction.
    pure subroutine set_offset(self, depth, work)
       class(force_law), intent(in) :: self
       !> Wear depth, on top of the gap (n_elements) [length].
@@ -465,7 +471,18 @@ contains
                                                         (p%gap_at(i, work%rate) + depth(i))
          end do
       end associate
+      call self%set_friction(depth, work)
    end subroutine set_offset
+
+   !> What wear does to friction, before evaluations: nothing to that of most laws.
+   pure subroutine set_friction(self, depth, work)
+      class(force_law), intent(in) :: self
+      real(wp), intent(in) :: depth(:)
+      type(force_workspace), intent(inout) :: work
+
+      associate (unused => self, unused_depth => depth, unused_work => work)
+      end associate
+   end subroutine set_friction
 
    !> Instants that the forces at the last evaluation ask for: none where the law is content with
    !> what `facts` say.

@@ -200,6 +200,7 @@ contains
       logical :: wanted(3)
       integer :: n_blocks, block, k
 
+      call self%take_friction(work)
       do k = 1, size(wanted)
          wanted(k) = any(self%present(k, :))
       end do
@@ -235,7 +236,7 @@ contains
       if (work%measures_slip) then
          ! The march has ended where it started, so one more turn over the same prediction is the
          ! period.
-         call slip_work(self%n_elements, fourier%n_time, self%mu, work%prediction_time, &
+         call slip_work(self%n_elements, fourier%n_time, work%mu, work%prediction_time, &
                         self%facts%remembers, work%x, work%slip)
          where (work%rests) work%slip = 0.0_wp
       end if
@@ -296,7 +297,7 @@ contains
       integer :: c, k
 
       start = work%x_start(pair, :) - work%mean(pair, :)
-      call come_to_rest(self%n_elements, n_time, pair, work%prediction_time, self%mu(pair), &
+      call come_to_rest(self%n_elements, n_time, pair, work%prediction_time, work%mu(pair), &
                         work%scale(pair) + sum(abs(start)), start, rest)
       work%rests(pair) = rest%found
       if (.not. rest%found) then
@@ -334,7 +335,7 @@ contains
       if (.not. self%facts%remembers) then
          ! At velocity level there is no position that could drift.
          work%drift(first:last) = 0.0_wp
-         call project_turn(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
+         call project_turn(self%n_elements, n_time, first, last, work%mu, work%prediction_time, &
                            work%force_time, room%margin, work%pressure)
          work%turns(first:last) = 1
          return
@@ -363,11 +364,11 @@ contains
 
       start(:last - first + 1, :) = work%x(first:last, :)
       if (self%two_directions) then
-         call march_turn_2d(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
+         call march_turn_2d(self%n_elements, n_time, first, last, work%mu, work%prediction_time, &
                             work%x, work%force_time, room%margin, work%pressure)
       else
          ! A limit that was looked for is not where the last turn ended.
-         call march_turn_1d(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
+         call march_turn_1d(self%n_elements, n_time, first, last, work%mu, work%prediction_time, &
                             work%x, work%force_time, room%margin, work%pressure, &
                             again=turn > 1 .and. turn <= plain_turns)
       end if
@@ -390,7 +391,7 @@ contains
       do i = first, last
          if (work%turns(i) > 0) cycle
          x = work%x(i, :)
-         call settle_samples(self%n_elements, n_time, i, work%prediction_time, self%mu(i), &
+         call settle_samples(self%n_elements, n_time, i, work%prediction_time, work%mu(i), &
                              work%scale(i), periodic_tolerance, x, room%settled(i))
          work%x(i, :) = x
       end do
@@ -430,7 +431,7 @@ contains
       do k = 1, n_time
          do i = 1, self%n_elements
             ! lambda_n is negative in contact.
-            limit = -self%mu(i)*work%force_time(i, 3, k)
+            limit = -work%mu(i)*work%force_time(i, 3, k)
             tangential = norm2(work%force_time(i, 1:2, k))
             if (work%force_time(i, 3, k) >= 0.0_wp) then
                share(3, i) = share(3, i) + 1.0_wp

@@ -241,7 +241,7 @@ contains
       of_pair%y_n = work%prediction_time(i, 3, :)
       call find_start(self, fourier, room%settled(i), work, i, of_pair, x, unique)
       call follow_one_direction(fourier%n_time, merge(1, work%turns(i), unique), of_pair%y_t, &
-                                of_pair%y_n, self%mu(i), &
+                                of_pair%y_n, work%mu(i), &
                                 merge(touch*work%scale(i), 0.0_wp, unique), &
                                 self%facts%remembers .or. work%rests(i), unique, x(t), of_pair%at)
       place = (t - 1)*nc + 1
@@ -284,7 +284,7 @@ contains
          z = x
          if (work%rests(pair)) z = x - work%mean(pair, :)
          call limit_is_unique(self%n_elements, fourier%n_time, pair, work%prediction_time, &
-                              self%mu(pair), touch*work%scale(pair), z, unique, of_pair%inverse, &
+                              work%mu(pair), touch*work%scale(pair), z, unique, of_pair%inverse, &
                               of_pair%by_start)
       end if
       if (.not. unique) x = work%x_start(pair, :)
@@ -328,15 +328,17 @@ contains
       if (work%rests(i)) then
          work%slip_derivative(:, i) = 0.0_wp
       else
-         call differentiate_path(self, fourier, i, x, unique, of_pair, work%slip_derivative(:, i))
+         call differentiate_path(self, fourier, i, work%mu(i), x, unique, of_pair, &
+                                 work%slip_derivative(:, i))
       end if
    end subroutine differentiate_rows
 
    !> dS of a pair by the Fourier coefficients of its predicted forces.
-   subroutine differentiate_path(self, fourier, i, x, unique, of_pair, gradient)
+   subroutine differentiate_path(self, fourier, i, mu, x, unique, of_pair, gradient)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       integer, intent(in) :: i
+      real(wp), intent(in) :: mu
       !> At the end of the period, and whether the derivative is that of the limit alone.
       real(wp), intent(in) :: x(2)
       logical, intent(in) :: unique
@@ -347,7 +349,7 @@ contains
       if (.not. allocated(of_pair%by_x)) allocate (of_pair%by_x(2, fourier%n_time), &
                                                    of_pair%by_p(fourier%n_time))
       associate (nc => fourier%n_coefficients, n_time => fourier%n_time)
-         call slip_weights(n_time, of_pair%y, self%mu(i), self%facts%remembers, x, of_pair%by_x, &
+         call slip_weights(n_time, of_pair%y, mu, self%facts%remembers, x, of_pair%by_x, &
                            of_pair%by_p)
          if (self%facts%is_curved) of_pair%by_p = of_pair%turn%pressing*of_pair%by_p
          call of_pair%turn%sum_positions(nc, fourier%synthesis, self%present(:, i), of_pair%by_x, &
@@ -391,12 +393,12 @@ contains
       call find_start(self, fourier, settled, work, pair, of_pair, x, unique)
       if (unique) then
          call of_pair%turn%to_limit(fourier%n_time, fourier%n_coefficients, fourier%synthesis, &
-                                    of_pair%y, self%mu(pair), touch*work%scale(pair), &
+                                    of_pair%y, work%mu(pair), touch*work%scale(pair), &
                                     self%present(:, pair), of_pair%inverse, x)
       else
          ! From the start once more, with derivatives, as many turns as the march took.
          call of_pair%turn%march(fourier%n_time, fourier%n_coefficients, work%turns(pair), &
-                                 fourier%synthesis, of_pair%y, self%mu(pair), 0.0_wp, &
+                                 fourier%synthesis, of_pair%y, work%mu(pair), 0.0_wp, &
                                  self%present(:, pair), &
                                  self%facts%remembers .or. work%rests(pair), x)
       end if

@@ -44,6 +44,7 @@ contains
       self%two_directions = law%two_directions
       if (allocated(law%present)) self%present = law%present
       if (allocated(law%mu)) self%mu = law%mu
+      if (allocated(law%worn)) self%worn = law%worn
    end function follow_events
 
    !> The instants of `fourier` are a grid that isolates events: four for each wave are enough.
@@ -67,8 +68,10 @@ contains
       type(force_workspace), intent(inout) :: work
 
       if (self%n_elements == 0) return
+      call self%take_friction(work)
       select type (room => work%room)
       class is (event_room)
+         if (allocated(self%worn)) call room%paths%take_friction(work%mu)
          ! Rates leave the mean position open: for pairs that come to rest it goes along.
          if (any(self%prediction%order > 0) .and. fourier%has_constant()) then
             call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &

@@ -136,6 +136,8 @@ contains
       part%side_1 = contact%side_1(:, pair)
       part%side_2 = contact%side_2(:, pair)
       part%mu = contact%mu(pair)
+      if (allocated(contact%worn_friction)) part%worn_friction = &
+         contact%worn_friction%of_pairs(pair)
       part%gap = contact%gap(pair)
       part%normal_load = contact%normal_load(pair)
       part%speed_order = contact%speed_order

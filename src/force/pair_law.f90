@@ -9,6 +9,7 @@ module fw_pair_law
    use fw_kinds, only: wp
    use fw_normal_law, only: curved_pairs, normal_law, pairs_with, power, press_pairs, table, &
       take_normal_laws
+   use fw_worn_friction, only: worn_friction
    implicit none (type, external)
    private
 
@@ -17,6 +18,8 @@ module fw_pair_law
    type, abstract, extends(force_law) :: pair_law
       !> Friction coefficient (n_elements).
       real(wp), allocatable :: mu(:)
+      !> How it changes with wear; not allocated where it does not.
+      type(worn_friction), allocatable :: worn
       !> Whether a pair has two tangential directions.
       logical :: two_directions = .false.
       !> How the pairs press (n_elements); springs where it is not allocated.
@@ -40,6 +43,10 @@ module fw_pair_law
       procedure :: input_of_pressure
       procedure :: pressing_constant
       procedure :: slope_at_rest
+      procedure :: set_friction
+      procedure :: take_friction
+      procedure :: friction_of
+      procedure :: friction_rests
       procedure :: located
    end type pair_law
 
@@ -57,6 +64,7 @@ contains
          return
       end if
       call self%take_pairs(contact%mu, present)
+      if (allocated(contact%worn_friction)) self%worn = contact%worn_friction
       associate (p => self%prediction)
          p%scale = contact%penalty_scale
          p%gap = contact%gap
@@ -293,6 +301,45 @@ contains
       name = ''
       if (allocated(self%normal)) name = self%normal(element)%constant_name()
    end function pressing_constant
+
+   !> The friction of pairs at their depths.
+   pure subroutine set_friction(self, depth, work)
+      class(pair_law), intent(in) :: self
+      real(wp), intent(in) :: depth(:)
+      type(force_workspace), intent(inout) :: work
+
+      if (.not. allocated(self%worn)) return
+      call self%worn%at_depth(self%mu, depth, work%mu, work%mu_growth)
+   end subroutine set_friction
+
+   !> Before an evaluation: friction that does not wear is that of the law.
+   pure subroutine take_friction(self, work)
+      class(pair_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+
+      if (.not. allocated(self%worn)) work%mu = self%mu
+   end subroutine take_friction
+
+   !> The friction coefficient of an element at its depth.
+   pure real(wp) function friction_of(self, element, work) result(mu)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      type(force_workspace), intent(in) :: work
+
+      mu = self%mu(element)
+      if (allocated(self%worn)) mu = work%mu(element)
+   end function friction_of
+
+   !> Whether no friction is further from where wear leads it than this part of its range.
+   pure logical function friction_rests(self, work, part) result(rests)
+      class(pair_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(in) :: part
+
+      rests = .true.
+      if (allocated(self%worn)) rests = all(abs(work%mu - self%worn%final) <= &
+                                            part*max(self%mu, self%worn%final))
+   end function friction_rests
 
    !> A pair without friction or load holds nothing tangentially.
    pure real(wp) function slope_at_rest(self, element, component) result(slope)

@@ -117,6 +117,7 @@ contains
       select type (room => work%room)
       type is (rigid_room)
          if (room%n_massive == 0) return
+         if (allocated(self%worn)) room%massive%curves%mu = work%mu(room%pair)
          call evaluate_massive(self, fourier, work, room)
          if (work%measures_slip) call measure_paths(room, work%slip)
       end select

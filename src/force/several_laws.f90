@@ -8,6 +8,7 @@ module fw_several_laws
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
+   use fw_worn_friction, only: worn_friction
    implicit none (type, external)
    private
 
@@ -91,6 +92,7 @@ contains
             self%of_member(at) = m
             self%place(at) = [(i, i=1, size(at))]
             self%mu(at) = law%mu
+            if (allocated(law%worn)) call take_worn(self, at, law%worn)
             self%prediction%stiffness(at, :) = law%prediction%stiffness
             self%prediction%gap(at) = law%prediction%gap
             self%prediction%load(at) = law%prediction%load
@@ -122,6 +124,22 @@ contains
       if (.not. allocated(joined)) allocate (joined(n), source=0.0_wp)
       joined(at) = growth
    end subroutine join_growth
+
+   !> How the friction of some pairs changes: that of all has the same form.
+   subroutine take_worn(self, at, worn)
+      class(several_laws), intent(inout) :: self
+      integer, intent(in) :: at(:)
+      type(worn_friction), intent(in) :: worn
+
+      if (.not. allocated(self%worn)) then
+         allocate (self%worn)
+         self%worn%form = worn%form
+         allocate (self%worn%final(self%n_elements), self%worn%rate(self%n_elements), &
+                   source=0.0_wp)
+      end if
+      self%worn%final(at) = worn%final
+      self%worn%rate(at) = worn%rate
+   end subroutine take_worn
 
    !> What holds of all members.
    subroutine find_facts(self)
@@ -238,6 +256,7 @@ contains
       type(force_workspace), intent(inout) :: work
       integer :: m
 
+      call self%take_friction(work)
       select type (room => work%room)
       type is (members_room)
          do m = 1, size(self%member)
@@ -259,6 +278,7 @@ contains
 
       own%prediction = work%prediction(at, :, :)
       own%offset = work%offset(at)
+      own%mu = work%mu(at)
       own%mean = work%mean(at, :)
       own%x_start = work%x_start(at, :)
       own%rate = work%rate

@@ -154,7 +154,8 @@ contains
             deallocate (self%parts%cyclic%nodal)
          end if
          call fatal_error(error, "'"//name//"' is no "//kind//' part of a model: must be one '// &
-                          'of '//names_to_put(kind)//meant_part(name), status_usage)
+                          'of '//names_to_put(kind, name)//meant_part(name), &
+                          status_usage)
       end if
       !$omp end critical (fretwear_io)
    end subroutine take

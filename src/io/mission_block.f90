@@ -7,6 +7,7 @@ module fw_mission_block
    use fw_kinds, only: wp
    use fw_read_mission, only: split_change
    use fw_text, only: string_type, to_text
+   use fw_wear_options, only: mu_by_energy
    implicit none (type, external)
    private
 
@@ -43,6 +44,10 @@ contains
             what = 'has contact pairs between other dofs than the case'
          else if (any(abs(own%area - c%area) > 1.0e-12_wp*c%area)) then
             what = 'has contact pairs of other areas than the case'
+         else if (case%wear%mu_by == mu_by_energy .and. &
+                  differs(case%wear%coefficient, block%wear%coefficient)) then
+            what = "has other wear%coefficient than the case, with wear%mu_by = 'energy': its "// &
+                   "depth would not tell the energy; use 'depth'"
          else if (block%harmonics%n_harmonics > case%harmonics%n_harmonics) then
             what = 'has more harmonics than the case, whose rows hold '// &
                    to_text(case%harmonics%n_harmonics)
@@ -58,6 +63,12 @@ contains
                        trim(case%mission%title(number))//' '//what//': the blocks of a mission '// &
                        'wear the same pairs', status_input)
    end subroutine check_alike
+
+   pure logical function differs(a, b)
+      real(wp), intent(in) :: a(:), b(:)
+
+      differs = any(abs(a - b) > 0.0_wp)
+   end function differs
 
    !> Number of the law of every pair (n_pairs).
    pure function laws_of(contact) result(numbers)

@@ -93,23 +93,52 @@ contains
       is_of_kind = part%kind == kind .or. (kind == 'real' .and. part%kind == 'complex')
    end function is_of_kind
 
-   !> Names of the parts of a kind that calling programs give: `a, b, c`.
-   function names_to_put(kind) result(text)
-      !> Such as real.
-      character(*), intent(in) :: kind
-      character(:), allocatable :: text
+   !> Names of the parts of a kind that calling programs give: `a, b, c`. Of a name in a group that
+   !> there is, those of that group; else the others, and each group once, as `group/...`.
+   function names_to_put(kind, name) result(text)
+      !> Kind: such as real. Name: what a program gave, 'group/part' or 'part'.
+      character(*), intent(in) :: kind, name
+      character(:), allocatable :: text, group, before, row
       type(part_type), allocatable :: parts(:)
+      logical :: is_known
       integer :: i
 
       parts = model_parts()
+      group = group_of(name)
+      is_known = len(group) > 0 .and. any([(is_wanted(parts(i)) .and. &
+                                            index(parts(i)%name, group) == 1, i=1, size(parts))])
       text = ''
+      before = ''
       do i = 1, size(parts)
-         if (len(put_name(parts(i)%name)) == 0) cycle
-         if (.not. is_of_kind(parts(i), kind)) cycle
+         if (.not. is_wanted(parts(i))) cycle
+         row = put_name(parts(i)%name)
+         if (is_known .and. index(row, group) /= 1) cycle
+         if (.not. is_known .and. len(group_of(row)) > 0) then
+            if (group_of(row) == before) cycle
+            before = group_of(row)
+            row = before//'...'
+         end if
          if (len(text) > 0) text = text//', '
-         text = text//put_name(parts(i)%name)
+         text = text//row
       end do
+
+   contains
+
+      pure logical function is_wanted(part)
+         type(part_type), intent(in) :: part
+
+         is_wanted = len(put_name(part%name)) > 0 .and. is_of_kind(part, kind)
+      end function is_wanted
+
    end function names_to_put
+
+   !> `group/` of `group/part`, nothing of a part that stands alone.
+   pure function group_of(name) result(group)
+      character(*), intent(in) :: name
+      character(:), allocatable :: group
+
+      group = name(:index(name, '/'))
+   end function group_of
 
    !> Keys of the constants of pairs that laws declare.
    function keys_of_laws() result(keys)

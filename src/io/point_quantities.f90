@@ -14,10 +14,10 @@ module fw_point_quantities
       parameter_dataset, parameter_group, parameter_words
    use fw_patches, only: count_patches
    use fw_point, only: point_type
-   use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
-      follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, has_levels, &
-      has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
-      is_response, moves_base, scales_load, shows_contact, shows_user, wears
+   use fw_quantity_conditions, only: always, asks_stability, changes_friction, follows_branch, &
+      follows_frequency, follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, &
+      has_levels, has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, &
+      is_mode, is_response, moves_base, scales_load, shows_contact, shows_user, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -154,6 +154,8 @@ contains
       call add('wear/cycles', r, '1', 'step', 'cycles of vibration', wears)
       call add('wear/depth', r, '<length>', 'step pair', 'wear depth', wears)
       call add('wear/rate', r, '<length>', 'step pair', 'wear depth per cycle', wears)
+      call add('wear/mu', r, '1', 'step pair', 'friction coefficient at the depth', &
+               changes_friction)
       call add('wear/energy', r, '<energy>', 'step pair', 'accumulated friction energy', wears)
       call add('wear/volume', r, '<volume>', 'step patch', 'worn volume of the patch', wears)
       call add('stress/amplitude', r, '<stress>', 'point stress', &
@@ -451,6 +453,8 @@ contains
          if (allocated(point%depth)) values = point%depth
       case ('wear/rate')
          if (allocated(point%wear_rate)) values = point%wear_rate
+      case ('wear/mu')
+         if (allocated(point%worn_mu)) values = point%worn_mu
       case ('wear/energy')
          if (allocated(point%wear_energy)) values = point%wear_energy
       case ('wear/volume')

@@ -4,10 +4,11 @@ module fw_quantity_conditions
    use fw_kinds, only: wp
    use fw_parameters, only: harmonic_scale, loss_factor
    use fw_solver_options, only: continuation_arclength
+   use fw_wear_options, only: mu_by_none
    implicit none (type, external)
    private
 
-   public :: always, asks_stability, follows_branch, follows_frequency, follows_parameter, &
+   public :: always, asks_stability, changes_friction, follows_branch, follows_frequency, follows_parameter, &
              follows_speed, goes_over, has_dampers, has_endurance, has_levels, has_stress, &
              has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
              is_response, moves_base, scales_load, &
@@ -174,6 +175,13 @@ contains
 
       is_mission = wears(case) .and. case%mission%is_wanted()
    end function is_mission
+
+   !> Wear that changes friction.
+   pure logical function changes_friction(case)
+      type(case_type), intent(in) :: case
+
+      changes_friction = wears(case) .and. case%wear%mu_by /= mu_by_none
+   end function changes_friction
 
    !> The joint wears.
    pure logical function wears(case)

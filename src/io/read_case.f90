@@ -290,6 +290,9 @@ contains
       call case%solver%bind_keys(reader)
       call case%pseudo_time%bind_keys(reader)
       call case%wear%bind_keys(reader, analyses(case%analysis)%wears)
+      if (.not. reader%failed() .and. allocated(case%contact%area)) then
+         call case%wear%friction(case%contact%area, case%contact%worn_friction)
+      end if
       call read_mission(reader, directory_of(path), case%mission, case%inputs)
       call case%time%bind_keys(reader)
       call read_mode(reader, case%analysis, case%mode)

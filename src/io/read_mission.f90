@@ -19,7 +19,7 @@ module fw_read_mission
    character(*), parameter :: common_groups(*) = [character(12) :: 'case', 'mission', 'output', &
       'pseudo_time', 'sensitivity', 'control', 'mode', 'resonance', 'time']
    character(*), parameter :: own_wear_keys(*) = [character(16) :: 'coefficient', &
-      'follow_resonance']
+      'follow_resonance', 'mu_final', 'mu_scale']
    character(*), parameter :: common_contact_keys(*) = [character(9) :: 'n_pairs', 'side_1', &
       'side_2', 'sector_2', 'area', 'law', 'worn', 'worn_step', 'memory']
 

@@ -3,6 +3,7 @@ module fw_wear_options
    use fw_key, only: key, key_visitor
    use fw_key_range, only: above, at_least, at_most, below, from_to, operator(.and.)
    use fw_kinds, only: wp
+   use fw_worn_friction, only: friction_by_energy, friction_decays, worn_friction
    implicit none (type, external)
    private
 
@@ -10,6 +11,7 @@ module fw_wear_options
    public :: follow_range
    public :: wear_explicit, wear_implicit, wear_pseudo_time
    public :: wear_archard, wear_energy
+   public :: mu_by_energy, mu_by_none
 
    character(*), parameter :: wear_scheme_words(*) = &
       [character(11) :: 'explicit', 'implicit', 'pseudo_time']
@@ -17,6 +19,9 @@ module fw_wear_options
 
    character(*), parameter :: wear_law_words(*) = [character(7) :: 'archard', 'energy']
    integer, parameter :: wear_archard = 1, wear_energy = 2
+
+   character(*), parameter :: mu_by_words(*) = [character(6) :: 'none', 'depth', 'energy']
+   integer, parameter :: mu_by_none = 1, mu_by_depth = 2, mu_by_energy = 3
 
    type :: wear_options
       !> One of the constants above.
@@ -43,6 +48,10 @@ module fw_wear_options
       real(wp) :: relative_step = 0.0_wp
       !> Run a second time with steps of half the size, to see how far the profile moves.
       logical :: check_steps = .false.
+      !> Whether friction changes with the depth or with the friction energy; towards mu_final, over
+      !> the scale [length or force*length] (n_pairs).
+      integer :: mu_by = mu_by_none
+      real(wp), allocatable :: mu_final(:), mu_scale(:)
       !> Keep the excitation at the resonance of the first observed quantity.
       logical :: follow_resonance = .false.
    contains
@@ -50,6 +59,7 @@ module fw_wear_options
       procedure :: controls_error
       procedure :: tolerance
       procedure :: halve_steps
+      procedure :: friction
    end type wear_options
 
    !> How far the resonance is followed, as parts of the first frequency.
@@ -93,6 +103,14 @@ contains
       call keys%bind(key('max_steps', 'steps at most', at_least(1)), self%max_steps)
       call keys%bind(key('check_steps', 'run once more with halved steps, to see how far the '// &
                          'profile moves'), self%check_steps)
+      call keys%bind_word(key('mu_by', 'whether friction changes with the depth, or with the '// &
+                              'friction energy of its pair'), self%mu_by, mu_by_words)
+      call keys%bind(key('mu_final', 'friction coefficient that wear leads to', at_least(0.0_wp), &
+                         shape='n_pairs', absent='required with mu_by', only='mu_by'), &
+                     self%mu_final, needed=self%mu_by /= mu_by_none)
+      call keys%bind(key('mu_scale', 'depth or energy after which 1/e of the change is left', &
+                         above(0.0_wp), 'L or F L', 'n_pairs', absent='required with mu_by', &
+                         only='mu_by'), self%mu_scale, needed=self%mu_by /= mu_by_none)
       call keys%bind(key('follow_resonance', 'keep the frequency at the peak of the first '// &
                          'observed quantity'), self%follow_resonance)
    end subroutine bind_keys
@@ -111,6 +129,30 @@ contains
       tolerance = self%error_tolerance
       if (tolerance <= 0.0_wp) tolerance = default_error_tolerance
    end function tolerance
+
+   !> How friction follows the depth: energy does by the law of wear.
+   subroutine friction(self, area, worn)
+      class(wear_options), intent(in) :: self
+      !> Of the pairs (n_pairs) [length**2].
+      real(wp), intent(in) :: area(:)
+      !> Not allocated where friction stays as it is.
+      type(worn_friction), allocatable, intent(out) :: worn
+
+      if (self%mu_by == mu_by_none .or. .not. allocated(self%coefficient)) return
+      if (.not. (allocated(self%mu_final) .and. allocated(self%mu_scale))) return
+      allocate (worn)
+      worn%final = self%mu_final
+      worn%form = friction_decays
+      worn%rate = 1.0_wp/self%mu_scale
+      if (self%mu_by == mu_by_depth) return
+      worn%rate = area/(self%coefficient*self%mu_scale)
+      ! By the law of energy depth and energy go together.
+      select case (self%law)
+      case (wear_archard)
+         worn%form = friction_by_energy
+      case default
+      end select
+   end subroutine friction
 
    !> Ask for steps of half the size. The estimate of the error grows with the power of the step
    !> that the control of the steps takes it to have.

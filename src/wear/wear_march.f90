@@ -286,7 +286,8 @@ contains
       end if
       self%checked_depth = depth
       self%checked_rate = state%rate
-      if (changed) return
+      ! Rates of today say nothing of tomorrow while friction is on its way.
+      if (changed .or. .not. system%friction_rests(unchanged)) return
       if (depth < system%compression()) return
       pressure = system%mean_pressure()
       ! Every pair wears, or bears nothing.

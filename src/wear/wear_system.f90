@@ -27,7 +27,7 @@ module fw_wear_system
    use fw_balance_state, only: balance_state
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
-   use fw_force_law, only: pair_mixed, pair_stuck
+   use fw_force_law, only: force_workspace, pair_mixed, pair_stuck
    use fw_kinds, only: i8, wp
    use fw_lapack, only: dgemm
    use fw_tall_product, only: multiply_transposed
@@ -46,8 +46,11 @@ module fw_wear_system
       real(wp), allocatable :: base(:)
       !> Depth per cycle [length] at the last point (n_pairs).
       real(wp), allocatable :: rate(:)
-      !> From S to the rate: k_w/(A eps) (n_pairs).
-      real(wp), allocatable, private :: factor(:)
+      !> From S to the rate: k_w/(A eps), by energy times mu, and whether it is so (n_pairs).
+      real(wp), allocatable, private :: factor(:), by_slip(:)
+      logical, private :: by_energy = .false.
+      !> Friction that wear leads to, and the largest on the way; not allocated where it stays.
+      real(wp), allocatable, private :: mu_final(:), mu_largest(:)
       !> Prediction stiffness in the normal direction (n_pairs) [force/length].
       real(wp), allocatable, private :: normal(:)
       !> Makes a force of a depth: the same, or where there is none the tangential one (n_pairs).
@@ -83,6 +86,8 @@ module fw_wear_system
       procedure :: openings
       procedure :: compression
       procedure :: depth_scale
+      procedure :: friction
+      procedure :: friction_rests
       procedure :: slides
       procedure :: take
       procedure :: conditions
@@ -121,9 +126,15 @@ contains
          end associate
       end associate
       allocate (self%base(contact%n_pairs), self%rate(contact%n_pairs), source=0.0_wp)
-      allocate (self%factor(contact%n_pairs), source=0.0_wp)
-      where (tangential > 0.0_wp) self%factor = coefficient/(contact%area*tangential)
-      if (by_energy) self%factor = contact%mu*self%factor
+      allocate (self%by_slip(contact%n_pairs), source=0.0_wp)
+      where (tangential > 0.0_wp) self%by_slip = coefficient/(contact%area*tangential)
+      self%factor = self%by_slip
+      self%by_energy = by_energy
+      if (allocated(contact%worn_friction)) then
+         self%mu_final = contact%worn_friction%final
+         self%mu_largest = max(contact%mu, self%mu_final)
+      end if
+      if (by_energy) self%factor = contact%mu*self%by_slip
       self%weight = self%normal
       where (self%weight <= 0.0_wp) self%weight = tangential
       where (self%weight <= 0.0_wp) self%weight = 1.0_wp
@@ -155,7 +166,11 @@ contains
    subroutine update_rate(self)
       class(wear_system), intent(inout) :: self
 
-      self%rate = self%factor*self%vibration%work(self%vibration%problem%forces%pairs)%slip
+      associate (work => self%vibration%work(self%vibration%problem%forces%pairs))
+         ! Friction may change with the depth.
+         if (self%by_energy) self%factor = work%mu*self%by_slip
+         self%rate = self%factor*work%slip
+      end associate
    end subroutine update_rate
 
    !> Whether the vibration is solved by itself from now on: nobody wants derivatives of the rates
@@ -174,6 +189,24 @@ contains
 
       slides = maxval(self%vibration%work(self%vibration%problem%forces%pairs)%slip) > 0.0_wp
    end function slides
+
+   !> Friction coefficients at the depths of the last point.
+   pure function friction(self) result(mu)
+      class(wear_system), intent(in) :: self
+      real(wp) :: mu(self%n_extra)
+
+      mu = self%vibration%work(self%vibration%problem%forces%pairs)%mu
+   end function friction
+
+   !> Whether no friction is further from where wear leads it than this part of its range.
+   pure logical function friction_rests(self, part) result(rests)
+      class(wear_system), intent(in) :: self
+      real(wp), intent(in) :: part
+
+      rests = .true.
+      if (allocated(self%mu_final)) rests = all(abs(self%friction() - self%mu_final) <= &
+                                                part*self%mu_largest)
+   end function friction_rests
 
    !> Depths in the units in which residuals count them [force].
    pure function force_of_depth(self, depth) result(force)
@@ -322,6 +355,7 @@ contains
          do i = 1, self%n_extra
             ! Sliding under pressure of all others is zero around here, and so is its derivative.
             if (self%vibration%work(pairs)%linear_state(i) /= pair_mixed) cycle
+            if (self%vibration%problem%joint%row(3, i) > 0) call find_response(self, i)
             self%pivot(i) = 1.0_wp - self%cycles*self%factor(i)*depth_slope(self, i)
             if (abs(self%pivot(i)) < self%least_pivot) then
                self%pivot(i) = 0.0_wp
@@ -338,6 +372,41 @@ contains
       end associate
       self%vibration%pins_normals = .true.
    end subroutine choose
+
+   !> What the depth does to the forces of a pair: by its normal input, and by its friction, which
+   !> acts on what presses alone, T(mu y_n).
+   subroutine find_response(self, pair)
+      class(wear_system), intent(inout) :: self
+      integer, intent(in) :: pair
+      integer :: c, i, nc
+
+      associate (work => self%vibration%work(self%vibration%problem%forces%pairs))
+         nc = self%vibration%problem%fourier%n_coefficients
+         do c = 1, 3
+            ! What a component that is not there would be pushed by was never filled.
+            if (self%vibration%problem%joint%row(c, pair) == 0) cycle
+            do i = (c - 1)*nc + 1, c*nc
+               self%response(i, pair) = self%normal(pair)*work%jacobian(2*nc + 1, i, pair)
+               if (c < 3 .and. abs(work%mu_growth(pair)) > 0.0_wp) then
+                  self%response(i, pair) = self%response(i, pair) + work%mu_growth(pair)* &
+                                           by_normal(work, pair, work%jacobian(:, i, pair))
+               end if
+            end do
+         end do
+      end associate
+   end subroutine find_response
+
+   !> A derivative along the whole normal input of a pair.
+   pure real(wp) function by_normal(work, pair, gradient) result(slope)
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: pair
+      real(wp), intent(in) :: gradient(:)
+      integer :: nc
+
+      nc = size(work%prediction, 3)
+      slope = dot_product(gradient(2*nc + 1:3*nc), work%prediction(pair, 3, :)) + &
+              gradient(2*nc + 1)*work%offset(pair)
+   end function by_normal
 
    !> The derivative of a pair whose depth follows its sliding.
    subroutine eliminate(self, pair, jacobian)
@@ -357,7 +426,6 @@ contains
             ! What a component that is not there would be pushed by was never filled.
             if (self%vibration%problem%joint%row(c, pair) == 0) cycle
             do i = (c - 1)*nc + 1, c*nc
-               response(i) = self%normal(pair)*jacobian(2*nc + 1, i)
                jacobian(:, i) = jacobian(:, i) + factor*response(i)*slope
             end do
          end do
@@ -476,8 +544,7 @@ contains
                if (problem%joint%row(c, i) == 0) cycle
                call problem%incidence%scatter_row( &
                   problem%joint%row(c, i), active%place, active%n_active, active%n_active, &
-                  self%normal(i)*dz(j), self%vibration%work(problem%forces%pairs)%jacobian( &
-                  2*nc + 1, (c - 1)*nc + 1:c*nc, i), product)
+                  dz(j), self%response((c - 1)*nc + 1:c*nc, i), product)
             end do
          end do
       end associate
@@ -510,8 +577,16 @@ contains
       slope = 0.0_wp
       associate (problem => self%vibration%problem)
          if (problem%joint%row(3, pair) == 0) return
-         slope = self%normal(pair)*self%vibration%work(problem%forces%pairs)%slip_derivative( &
-                 2*problem%fourier%n_coefficients + 1, pair)
+         associate (work => self%vibration%work(problem%forces%pairs))
+            slope = self%normal(pair)*work%slip_derivative( &
+                    2*problem%fourier%n_coefficients + 1, pair)
+            if (.not. abs(work%mu_growth(pair)) > 0.0_wp) return
+            ! S(y_t, mu y_n)/mu in terms of mu y_n: mu dS/dmu is S by y_n, less S. By energy the
+            ! rate has a factor mu more.
+            slope = slope + work%mu_growth(pair)*by_normal(work, pair, &
+                                                           work%slip_derivative(:, pair))
+            if (.not. self%by_energy) slope = slope - work%mu_growth(pair)*work%slip(pair)
+         end associate
       end associate
    end function depth_slope
 

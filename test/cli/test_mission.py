@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from cases import merged, read, run, write_namelist
 from project import PROGRAM, ROOT
+from scipy.integrate import solve_ivp
 from wear_cases import CLOCK, joint, oscillator, result, shared_load
 
 LAWS = ROOT / "test" / "reference" / "laws"
@@ -15,6 +16,8 @@ SLIDING = json.loads((LAWS / "wear_mission.json").read_text())["cases"]
 VIBRATING = json.loads((LAWS / "wear_mission_vibration.json").read_text())["cases"]["vibrating"]
 # Marches of order 3 with steps of this error, over some hundred of them.
 STEP, MARCHED = 1e-9, 1e-10
+# Rates that change with friction: some ten steps, each as accurate as STEP.
+RUBBED = 10.0 * STEP
 
 
 def mission(groups, blocks, n_flights, per_jump=1, **changes):
@@ -61,6 +64,74 @@ def test_sliding_pair(tmp_path, name):
     assert found["mission/depth"][:, 0].tolist() == depth[::n_blocks].tolist()
     worn = np.diff(depth).reshape(-1, n_blocks).sum(axis=0)
     np.testing.assert_allclose(found["mission/share"][:, 0], worn / depth[-1], rtol=1e-12)
+
+
+def rubbing(slide, mu, by_energy, cycles):
+    """Depth of a pair whose normal force falls with it, in the units of `plain`."""
+    p = SLIDING["plain"]["params"]
+
+    def rate(_, depth):
+        normal = p["p0"] - p["kn"] * depth[0]
+        return p["k_w_over_A"] * normal * 4.0 * (slide - mu(depth[0]) * normal / p["kt"]) * (
+            mu(depth[0]) if by_energy else 1.0)
+
+    return solve_ivp(rate, (0.0, cycles), [0.0], method="DOP853", rtol=1e-12,
+                     atol=1e-14).y[0, -1]
+
+
+@pytest.mark.parametrize("law", ["archard", "energy"])
+@pytest.mark.parametrize("pairs", ["dlft", "rigid"])
+def test_friction_by_depth(tmp_path, pairs, law):
+    """Against the scalar equation of a pair that slides by a given amount."""
+    p, start, final, scale = SLIDING["plain"]["params"], 0.5, 0.2, 0.01
+    groups = merged(sliding("plain"), {
+        "contact": {"law": pairs}, "load": {"cosine": [p["kt"] * 0.3, 0.0]},
+        "wear": {"n_cycles": 40.0, "law": law, "mu_by": "depth", "mu_final": final,
+                 "mu_scale": scale}})
+    del groups["mission"]
+    found = result(tmp_path, groups)
+    expected = rubbing(0.3, lambda w: final + (start - final) * np.exp(-w / scale),
+                       law == "energy", 40.0)
+    np.testing.assert_allclose(found["wear/depth"][-1, 0], expected, rtol=RUBBED)
+    np.testing.assert_allclose(found["wear/mu"][:, 0], final + (start - final) * np.exp(
+        -found["wear/depth"][:, 0] / scale), rtol=1e-12)
+
+
+@pytest.mark.parametrize("by", ["depth", "energy"])
+def test_friction_of_elastic_pairs(tmp_path, by):
+    """The implicit schemes, which take derivatives, as the explicit one, which takes none."""
+    groups = merged(oscillator(7, "penalty", n_cycles=40.0, error_tolerance=1e-6), {
+        "contact": {"tangential_stiffness": 3.0, "normal_stiffness": 9.0},
+        "harmonics": {"n_time": None},
+        "wear": {"mu_by": by, "mu_final": 0.25, "mu_scale": {"depth": 0.05, "energy": 20.0}[by]}})
+    depth = {}
+    for scheme in ("implicit", "explicit", "pseudo_time"):
+        changed = {"wear": {"scheme": scheme}, "pseudo_time": {"scheme": "rosenbrock"}}
+        found = result(tmp_path, merged(groups, changed))
+        assert found["wear/mu"][-1, 0] < 0.9 * found["wear/mu"][0, 0]
+        depth[scheme] = found["wear/depth"][-1, 0]
+    # Some tens of steps of 1e-6.
+    assert abs(depth["explicit"] / depth["implicit"] - 1.0) < 1e-4
+    assert abs(depth["pseudo_time"] / depth["implicit"] - 1.0) < 1e-4
+
+
+def test_friction_by_energy(tmp_path):
+    """Blocks with friction that follows the energy: depths, energies, coefficients."""
+    p = SLIDING["mu_energy"]["params"]
+    changed = {"mu_by": "energy", "mu_final": p["mu_final"], "mu_scale": p["mu_energy"]}
+    found = result(tmp_path, merged(sliding("mu_energy"), {"wear": changed}))
+    rows = SLIDING["mu_energy"]["after_each_block"]
+    np.testing.assert_allclose(found["wear/depth"][:, 0], [row["W"] for row in rows],
+                               rtol=RUBBED, atol=0)
+    energy = np.array([row["energy"] for row in rows])
+    np.testing.assert_allclose(found["wear/mu"][:, 0], p["mu_final"] + (p["mu"] - p["mu_final"])
+                               * np.exp(-energy / p["mu_energy"]), rtol=RUBBED)
+    # The energy that the depth stands for, weighted step by step.
+    np.testing.assert_allclose(found["wear/energy"][:, 0], energy, rtol=1e-3)
+    other = merged(sliding("mu_energy"), {"wear": changed})
+    other["mission"]["change"][1] += "; wear%coefficient = 2e-3"
+    done = run(tmp_path, other, status=3)
+    assert "wear%coefficient" in done.stderr
 
 
 @pytest.mark.parametrize(("order", "error"), [(3, 1e-3), (7, 1e-4), (15, 2e-5)])
@@ -306,6 +377,8 @@ BAD = {
     "unknown key": ({"mission": {"change": ["", "load%harmonic_scal = 2"]}}, "harmonic_scale"),
     "harmonics": ({"mission": {"change": ["", "harmonics%n_harmonics = 9"]}},
                   "block 2 'b' has more harmonics than the case"),
+    "friction without its end": ({"wear": {"mu_by": "depth", "mu_scale": 1.0}},
+                                 "&wear mu_final is missing"),
     "jumps": ({"mission": {"flights_per_jump": -1}}, "flights_per_jump"),
 }
 

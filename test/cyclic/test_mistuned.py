@@ -182,6 +182,7 @@ REFUSED = {
                    ["mistuned", "n_sectors"]),
     "in time": ({"case": {"analysis": "time"}}, ["analysis", "mistuned"]),
     "accuracy": ({"harmonics": {"n_harmonics": None}}, ["accuracy", "n_harmonics", "mistuned"]),
+    "derivatives": ({"sensitivity": {"parameters": ["contact%mu"]}}, ["sensitivity", "mistuned"]),
     "collocation": ({"harmonics": {"method": "tcm"}}, ["method", "mistuned", "'hbm'"]),
     "too many": ({"cyclic": {"n_sectors": 2000}, "harmonics": {"n_harmonics": 10000},
                   "spring": {"n_springs": 1000, "side_1": 1, "coefficient": 1.0}},

@@ -26,7 +26,7 @@ that were interrupted and continued against whole ones, bit for bit. Missions on
 vibration jumps have several solutions, and are counted beside.
 """
 COUNT = 100
-SMALL = (0, 1, 2, 3)
+SMALL = (0, 1, 2, 5)
 COLUMNS = {"flown": "flown", "several": "vibration jumps", "ended": "ended in words",
            "judged": "judged block by block", "off": "off", "timed": "judged in time",
            "off_time": "off", "jumped": "by jumps", "off_jump": "off", "continued": "continued",

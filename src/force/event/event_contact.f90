@@ -43,6 +43,7 @@ module fw_event_contact
       !> and normal, n_pairs).
       real(wp), allocatable, private :: out(:, :, :)
    contains
+      procedure :: take_friction
       procedure :: evaluate
       procedure :: linearize
       procedure :: coefficients
@@ -92,6 +93,21 @@ contains
       allocate (self%out(fourier%n_coefficients, 2, self%n_pairs), source=0.0_wp)
       allocate (self%samples(fourier%n_time, 6, self%n_pairs), source=0.0_wp)
    end subroutine new_event_contact
+
+   !> Friction that has changed since the paths were made (n_pairs).
+   pure subroutine take_friction(self, mu)
+      class(event_contact_type), intent(inout) :: self
+      real(wp), intent(in) :: mu(:)
+      integer :: i
+
+      do i = 1, self%n_pairs
+         if (self%is_planar(i)) then
+            call self%planar(i)%take_friction(mu(i))
+         else
+            self%pair(i)%curves%mu = mu(i)
+         end if
+      end do
+   end subroutine take_friction
 
    !> Contact forces and the position at the end of the period.
    subroutine evaluate(self, fourier, prediction, offset, x_start, force, x, mean)

@@ -63,6 +63,7 @@ module fw_event_planar
       procedure :: sample
       procedure :: share
       procedure :: friction_path
+      procedure :: take_friction
    end type planar_pair_type
 
 contains
@@ -82,6 +83,14 @@ contains
       self%remembers = remembers
       allocate (self%force(cells%n_coefficients, 3), source=0.0_wp)
    end subroutine reserve
+
+   !> Friction that has changed since.
+   pure subroutine take_friction(self, mu)
+      class(planar_pair_type), intent(inout) :: self
+      real(wp), intent(in) :: mu
+
+      self%map%motion%mu = mu
+   end subroutine take_friction
 
    !> A turn of period_map: the path from x [force], where it ends, and the derivative of that.
    subroutine turn(self, x, after, m)
