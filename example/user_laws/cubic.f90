@@ -41,7 +41,8 @@ program cubic
 
    law%c = 0.5_wp
    call session%load_text('&case analysis = ''point'' / &model n_dof = 1 mass = 1 '// &
-                          'damping = 0.1 stiffness = 1 / &load cosine = 0.3 / &harmonics n_harmonics = 9 / '// &
+                          'damping = 0.1 stiffness = 1 / &load cosine = 0.3 / '// &
+                           '&harmonics n_harmonics = 9 / '// &
                           '&sweep start = 1.2 / &solver tolerance = 1e-11 /', 'cubic')
    call session%add_law('cubic', law, side_1=[1], odd=.true.)
    call session%run(observer, error, write_file=.false.)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 __all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic", "Damper",
            "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output", "Polynomial",
            "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Stress", "Structure",
-           "Sweep", "Time", "Wear"]
+           "Sweep", "Time", "User", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -415,6 +415,37 @@ class Damper(TypedDict, total=False):
     position_power: ArrayLike
 
 
+class User(TypedDict, total=False):
+    """Group &user: elements with laws of your own."""
+
+    #: number of elements (default: 0)
+    n_elements: int
+    #: shared library with the functions, relative to the namelist (required with n_elements)
+    library: str
+    #: name of the function, one for all or one for each element (required with n_elements)
+    symbol: str | int | Sequence[str | int]
+    #: displacements that each element takes (default: 1)
+    n_in: int
+    #: dofs of its inputs (required with n_elements)
+    side_1: ArrayLike
+    #: dofs on the other side, 0: ground (default: 0)
+    side_2: ArrayLike
+    #: constants that each function gets (default: 0)
+    n_parameters: int
+    #: the constants, n_par = n_parameters of each element (required with n_parameters)
+    parameters: ArrayLike
+    #: whether functions give slopes, or differences stand for them (default: 'given')
+    derivative: Literal["given", "difference"]
+    #: opposite motions have opposite forces: you promise it (default: .false.)
+    odd: bool
+    #: functions may be called from several threads (default: .false.)
+    thread_safe: bool
+    #: slopes are compared with differences before the run (default: .true.)
+    check: bool
+    #: what they may differ by, over the largest slope; only: check (default: 1e-5)
+    check_tolerance: float
+
+
 class Load(TypedDict, total=False):
     """Group &load: static and harmonic loads."""
 
@@ -769,6 +800,7 @@ class Groups(TypedDict, total=False):
     spring: Spring
     polynomial: Polynomial
     damper: Damper
+    user: User
     load: Load
     base: Base
     harmonics: Harmonics

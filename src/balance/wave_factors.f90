@@ -1,5 +1,5 @@
-!> Factors of the preconditioner of the balance for waves around equal sectors, one matrix a wave and
-!> harmonic, and of what sectors have of their own beside each other.
+!> Factors of the preconditioner of the balance for waves around equal sectors, one matrix a wave
+!> and harmonic, and of what sectors have of their own beside each other.
 module fw_wave_factors
    use fw_kinds, only: wp
    use fw_preconditioner_lu, only: preconditioner_lu_type

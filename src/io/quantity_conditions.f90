@@ -8,11 +8,10 @@ module fw_quantity_conditions
    implicit none (type, external)
    private
 
-   public :: always, asks_stability, changes_friction, follows_branch, follows_frequency, follows_parameter, &
-             follows_speed, goes_over, has_dampers, has_endurance, has_levels, has_stress, &
-             has_structural, has_tensor, is_accurate, is_controlled, is_mission, is_mode, &
-             is_response, moves_base, scales_load, &
-             shows_contact, shows_user, wears
+   public :: always, asks_stability, changes_friction, follows_branch, follows_frequency, &
+             follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, has_levels, &
+             has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, &
+             is_mode, is_response, moves_base, scales_load, shows_contact, shows_user, wears
 
 contains
 

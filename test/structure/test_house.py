@@ -13,9 +13,9 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (101303, 1000),
-    "files of src": (442, 10),
-    "lines of the longest file": (774, 50),
+    "lines of src": (104130, 1000),
+    "files of src": (451, 10),
+    "lines of the longest file": (788, 50),
     "modules used by one file, at most": (32, 2),
     "files that name forces%pairs": (42, 0),
     "files that name case_type": (60, 0),
