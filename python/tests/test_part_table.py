@@ -152,7 +152,7 @@ def test_strangers_are_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("name", "values", "told"), [
     ("dampping", [1.0], r"no real part .*\(did you mean damping\?\)"),
     ("mu", [1.0], r"\(did you mean contact/mu\?\)"),
-    ("cyclic/lefts", [1.0], "'cyclic/lefts' is no real part of a model: must be one of cyclic/"),
+    ("cyclic/lefts", [1.0], "'cyclic/lefts' is no real part of a model: must be one of mass"),
     ("aero/mode", [1.0], r"\(did you mean aero/modes\?\)"),
     ("nodal_diameter/0/masses", [1.0], "no real part"),
     ("observe/matrix", [1.0], "no real part"), ("mesh/points", [1.0], "no real part"),

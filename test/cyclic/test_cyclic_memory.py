@@ -227,7 +227,7 @@ REFUSED = {
     "nodal_diameter/0/mass": (np.zeros(7), "2 n"),
     "nodal_diameter/0/speed": (np.zeros(8), "nodal_diameter/K/mass, "),
     "aero/sector/6": (np.zeros(2), "from -5 to 5"),
-    "aero/sectors/1": (np.zeros(2), "mass, stiffness, damping"),
+    "aero/sectors/1": (np.zeros(2), "must be one of aero/sector/"),
     "aero/modes": (np.zeros(3), "multiple of 2"),
     "cyclic/n_sectors": (np.array([0]), "at least 1"),
     "contact/sector_2": (np.array([0, 0]), "must be 1"),
