@@ -18,7 +18,10 @@ module fw_law_check
 
    public :: check_group
 
+   !> Enough to meet both signs of displacements and rates several times.
    integer, parameter :: n_instants = 20
+   !> Motions over the linear one; and steps of the differences over the size of the input: the
+   !> longest serves forces with much round-off, the shortest those with much curvature.
    real(wp), parameter :: sizes(*) = [0.1_wp, 1.0_wp, 3.0_wp], noise = 0.01_wp, &
                           steps(*) = [1.0e-3_wp, 1.0e-4_wp, 1.0e-5_wp]
    !> Disagreement of one-sided differences, over the largest slope, that is a corner with the
@@ -43,7 +46,9 @@ contains
       real(wp), allocatable :: x(:), y(:, :, :)
       integer :: i, s
 
+      ! A balance without joint has no motion of its elements that would be worth a test.
       if (system%n == 0) return
+      ! With the joint stuck: no law has to be solved to have a motion of the right size.
       allocate (x(system%n))
       call stuck_guess(system, x)
       associate (entry => problem%forces%entry(law))
