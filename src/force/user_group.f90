@@ -104,7 +104,7 @@ contains
                          'namelist', absent='required with n_elements'), self%library, needed)
       call keys%bind_list(key('symbol', 'name of the function, one for all or one for each '// &
                               'element', absent='required with n_elements'), &
-                          'names of functions', max(1, self%n_given), self%symbol, is_text)
+                          'names of functions', most, self%symbol, is_text)
       call keys%bind(key('n_in', 'displacements that each element takes', &
                          from_to(1, most_inputs)), self%inputs)
       call keys%set_size('n_in', self%inputs)
@@ -125,9 +125,9 @@ contains
       call keys%bind(key('odd', 'opposite motions have opposite forces: you promise it'), self%odd)
       call keys%bind(key('thread_safe', 'functions may be called from several threads'), &
                      self%thread_safe)
-      call keys%bind(key('check', 'slopes are compared with differences before the run'), &
+      call keys%bind(key('check', 'functions are tried before the run: slopes, symmetry, memory'), &
                      self%check)
-      call keys%bind(key('check_tolerance', 'what they may differ by, over the largest slope', &
+      call keys%bind(key('check_tolerance', 'what slopes and odd forces may be off, relative', &
                          above(0.0_wp), only='check'), self%check_tolerance)
    end subroutine bind_keys
 
