@@ -188,7 +188,9 @@ module fw_rules
    !> Groups of elements that are neither pairs nor springs.
    type(rule_type), parameter :: of_elements(*) = [ &
       rule_type('elements beside pairs and springs', "case%analysis = 'time'", &
-                "use 'frf' or 'point'")]
+                "use 'frf' or 'point'"), &
+      rule_type('states of a law of a user', 'sweep%stability = .true.', &
+                'perturbations of its states are not followed: leave stability out')]
 
    type(rule_type), parameter :: of_wear(*) = [ &
       rule_type("case%analysis = 'wear'", 'a case without contact pairs', &

@@ -33,6 +33,8 @@ module fw_user_path
 
 contains
 
+   !> Room for the largest of the elements, and the base functions with their rates by tau: nothing
+   !> is allocated while elements are stepped.
    type(path_room) function new_path(element, fourier) result(self)
       type(user_element), intent(in) :: element(:)
       type(fourier_type), intent(in) :: fourier
@@ -114,6 +116,8 @@ contains
          wants = differentiates .or. turn > plain_turns
          call march(element, motion, n, m, wants, state, slope)
          if (motion%status /= 0) return
+         ! A turn has repeated where all states have; where round-off of the function lets them fall
+         ! no further, the last change counts, if it is small.
          change = state(:, motion%n_time) - state(:, 0)
          last = apart
          apart = share_of(change, state)
@@ -125,12 +129,14 @@ contains
             carried = by_motion
             call carry_all(path, motion, n, m, slope, carried)
             if (done .or. turn > plain_turns) then
+               ! Of the turn that repeats: dz_0 = dN/(1 - M).
                by_motion = by_motion + matmul(inverse, carried - by_motion)
             else
                by_motion = carried
             end if
          end if
          if (done) return
+         ! A plain turn goes on where the last one ended; Newton's method goes where it will repeat.
          if (turn > plain_turns) change = matmul(inverse, change)
          state(:, 0) = state(:, 0) + change
       end do

@@ -8,7 +8,7 @@ import joints
 import numpy as np
 from project import ROOT
 
-TITLE = "Laws of a user with states"
+TITLE = "Laws of a user with states: forces of another origin"
 TEXT = """
 Chains of one to six masses with one to four joints, between masses or to the ground, each a
 function in C that is stepped from instant to instant: a slider on a spring, Bouc and Wen's joint
@@ -154,7 +154,7 @@ def trial(seed, program, folder):
     derivative = ("given", "difference")[seed % 2]
     build(folder)
     (folder / "case.nml").write_text(text(case, "steps.so", derivative))
-    done = subprocess.run([program, "-q", "case.nml"], cwd=folder, capture_output=True, text=True,
+    done = subprocess.run([program, "case.nml"], cwd=folder, capture_output=True, text=True,
                           check=False, timeout=300)
     found = dict.fromkeys(COLUMNS, 0)
     if done.returncode == 4:
