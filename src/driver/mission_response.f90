@@ -572,6 +572,8 @@ contains
       compression = 0.0_wp
       do b = 1, size(self%blocks)
          if (.not. self%blocks(b)%is_known) cycle
+         ! Rates of today say nothing of tomorrow while friction is on its way.
+         if (.not. self%blocks(b)%joint%system%friction_rests(unchanged)) return
          here = self%blocks(b)%joint%system%mean_pressure()
          if (maxval(here) > 0.0_wp) pressure = max(pressure, here/maxval(here))
          compression = max(compression, self%blocks(b)%joint%system%compression())
