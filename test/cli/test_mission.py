@@ -276,7 +276,8 @@ def slow(per_jump, tolerance=STEP, n_flights=64):
 
 
 def test_jumps(tmp_path):
-    """Of second order in their length; by the error within what the file says."""
+    """Of second order in their length, order of the blocks included; by the error within what the
+    file says."""
     exact = result(tmp_path, slow(1))["mission/depth"][:, 0]
     error = []
     for per_jump in (8, 16, 32):
@@ -284,9 +285,10 @@ def test_jumps(tmp_path):
         flown = np.isfinite(found)
         assert flown.nonzero()[0].tolist() == list(range(0, 65, per_jump))
         error.append(found[-1] - exact[-1])
-    # Beside what the order of the blocks within a flight is worth, which no jump keeps.
     assert 3.8 < (error[2] - error[1]) / (error[1] - error[0]) < 4.2
-    assert abs(error[0]) < np.diff(exact).max()
+    # A flight by itself has none.
+    assert 3.5 < error[2] / error[1] < 4.5
+    assert abs(error[0]) < 0.1 * np.diff(exact).max()
     for tolerance in (1e-2, 1e-3, 1e-4):
         write_namelist(tmp_path / "case.nml", slow(0, tolerance))
         run(tmp_path, slow(0, tolerance))
@@ -295,9 +297,7 @@ def test_jumps(tmp_path):
             stated = file["mission"].attrs["jump_error"]
         flown = np.isfinite(depth)
         assert flown[-1]
-        off = np.abs(depth - exact)[flown].max()
-        assert off <= stated + np.diff(exact).max()
-        assert off <= 2.0 * tolerance * exact[-1]
+        assert np.abs(depth - exact)[flown].max() <= stated
 
 
 def same(found, expected):
