@@ -294,7 +294,7 @@ def test_a_wrong_slope_of_a_step_is_told(tmp_path, library):
                                  {"sweep": {"start": 1.1, "stability": True}}])
 def test_what_states_do_not_go_with_is_said(tmp_path, library, key):
     own = user(library, "relaxing", [0.8, 0.5, 0.25, 0.25])
-    assert "elements beside pairs and springs" in run(
+    assert "laws of a user" in run(
         tmp_path, groups(3, user=own) | key, status=3).stderr
 
 
