@@ -37,8 +37,8 @@ def test_dampers_as_integrated_elsewhere(tmp_path, name):
 def test_potential_as_integrated_elsewhere(tmp_path):
     case = test_polynomial.EXACT["coupled"]
     p = case["params"]
-    for polynomial in (test_polynomial.energy(p["potential"]), test_polynomial.forces(p["potential"])):
-        found = run_case(tmp_path, in_time(test_polynomial.groups(p, polynomial, 7)))
+    for form in (test_polynomial.energy, test_polynomial.forces):
+        found = run_case(tmp_path, in_time(test_polynomial.groups(p, form(p["potential"]), 7)))
         assert found.converged.all()
         assert difference(found.coefficients[0], test_polynomial.exact(case, 7)) < REPEATS
 
