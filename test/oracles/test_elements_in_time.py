@@ -20,6 +20,8 @@ REPEATS = 1e-7
 #: Midpoint steps of a period, and the motion's error of second order that they leave: 3e-6, and a
 #: margin of ten.
 STEPS, ERROR = 1000, 3e-5
+#: The same of twelve random joints, of which one has 1e-5.
+WIDE = 1e-4
 
 
 def in_time(groups, steps=STEPS):
@@ -87,6 +89,55 @@ def test_joint_is_as_balanced(tmp_path):
     assert errors[0] < ERROR
     # Of second order, but for where friction switches between the smallest steps.
     assert errors[1] < 0.4 * errors[0]
+
+
+def random_joint(seed):
+    """Two to four masses in a row, the first of which rubs, with dampers and potentials."""
+    size = np.random.default_rng(7300 + seed)
+    n = int(size.integers(2, 5))
+    k = np.diag(size.uniform(0.5, 2.0, n))
+    for i in range(n - 1):
+        k[i:i + 2, i:i + 2] += size.uniform(0.2, 1.5) * np.array([[1, -1], [-1, 1]])
+    law = str(size.choice(["penalty", "dlft", "regularised"]))
+    contact = {"n_pairs": 1, "law": law, "side_1": [1, 0, 0], "mu": 0.4,
+               "normal_load": float(size.uniform(0.2, 1.0))}
+    if law == "penalty":
+        contact["tangential_stiffness"] = float(size.uniform(0.5, 3.0))
+    if law == "regularised":
+        contact["slip_speed"] = float(size.uniform(0.05, 0.3))
+    n_dampers, n_terms = int(size.integers(1, 3)), int(size.integers(1, 4))
+    factors = np.zeros((n_terms, 8), int)
+    for term in factors:
+        if size.random() < 0.5:
+            term[:4] = int(size.integers(1, n + 1))
+        else:
+            term[:4] = np.repeat(size.choice(np.arange(1, n + 1), 2, replace=False), 2)
+    return {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": n, "mass": np.diag(size.uniform(0.5, 1.5, n)), "stiffness": k,
+                  "damping": 0.04 * k},
+        "contact": contact,
+        "damper": {"n_dampers": n_dampers, "side_1": size.integers(1, n + 1, n_dampers),
+                   "coefficient": size.uniform(0.05, 0.4, n_dampers),
+                   "power": size.choice([1.0, 1.5, 2.0, 3.0], n_dampers),
+                   "position_power": size.choice([0, 2], n_dampers)},
+        "polynomial": {"n_terms": n_terms, "coefficient": size.uniform(0.02, 0.3, n_terms),
+                       "factors": factors.ravel()},
+        "load": {"cosine": size.uniform(-1, 1, n), "sine": size.uniform(-0.5, 0.5, n)},
+        "harmonics": {"n_harmonics": 31}, "sweep": {"start": float(size.uniform(0.6, 2.0))},
+        "solver": {"tolerance": 1e-9}}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_joints_are_as_balanced(tmp_path, seed):
+    case = random_joint(seed)
+    found = run_case(tmp_path, in_time(case))
+    assert found.converged.all()
+    if case["contact"]["law"] == "dlft":
+        # Of the balance of rigid friction that the harmonics do not truncate.
+        case["contact"]["law"] = "rigid"
+    balanced = run_case(tmp_path, case)
+    assert difference(found.coefficients[0][:15], balanced.coefficients[0][:15]) < WIDE
 
 
 def test_a_damper_without_mass_is_refused(tmp_path):
