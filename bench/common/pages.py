@@ -43,6 +43,7 @@ COMMANDS = """## Measure
 | `python -m bench.speed.kernels` | kernels |
 | `python -m bench.speed.workers` | workers |
 | `python -m bench.speed.busy` | busy |
+| `python -m bench.speed.missions` | missions |
 | `make bench-full` | all others |
 | `make compare OTHER=fw_run TIMES=9` | two builds side by side, on the screen |"""
 

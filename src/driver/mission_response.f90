@@ -1,11 +1,12 @@
 !> A mission (analysis 'wear' with &mission): blocks of cycles in other conditions that wear the
 !> same joint in turn, flight after flight.
 !>
-!> Flights are flown in their order, or many at a time: a jump of m flights is each block for m
-!> times half its cycles, first to last and then last to first, which leaves an error of the second
-!> order. A jump is compared with the two of half its length, which are taken; their difference,
-!> over the largest depth, is to be within wear%error_tolerance, and tells how long the next one may
-!> be. Where it would be too short to pay, flights are flown in their order for a while.
+!> Flights are flown in their order, or many at a time: a jump of m flights is each block for
+!> (m + 1)/2 times its cycles, first to last, and then for (m - 1)/2 times, last to first. What the
+!> order of the blocks is worth within m flights is kept so, and the error is of the second order. A
+!> jump is compared with the two of half its length, which are taken; their difference, over the
+!> largest depth, is to be within wear%error_tolerance, and tells how long the next one may be.
+!> Where it would be too short to pay, flights are flown in their order for a while.
 module fw_mission_response
    use fw_analysis, only: analysis, run_type
    use fw_block_march, only: block_type, mission_state
@@ -280,7 +281,8 @@ contains
       end do
    end subroutine fly_one
 
-   !> Several flights as one: the blocks to and fro, each with half of its cycles.
+   !> Several flights as one: the blocks to and fro. That they go to with more of their cycles than
+   !> they come back is the order within one flight; of a single flight nothing comes back.
    subroutine fly_together(self, case, n, error)
       type(mission_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
@@ -300,7 +302,8 @@ contains
       do k = 1, 2*last - 1
          b = last - abs(last - k)
          cycles = n*case%mission%cycles(b)
-         if (b < last) cycles = 0.5_wp*cycles
+         if (k < last) cycles = 0.5_wp*(n + 1)*case%mission%cycles(b)
+         if (k > last) cycles = 0.5_wp*(n - 1)*case%mission%cycles(b)
          call wear_block(self, case, b, cycles, share, .false., error)
          if (allocated(error) .or. allocated(self%over%ending)) return
       end do
@@ -572,6 +575,8 @@ contains
       compression = 0.0_wp
       do b = 1, size(self%blocks)
          if (.not. self%blocks(b)%is_known) cycle
+         ! Rates of today say nothing of tomorrow while friction is on its way.
+         if (.not. self%blocks(b)%joint%system%friction_rests(unchanged)) return
          here = self%blocks(b)%joint%system%mean_pressure()
          if (maxval(here) > 0.0_wp) pressure = max(pressure, here/maxval(here))
          compression = max(compression, self%blocks(b)%joint%system%compression())

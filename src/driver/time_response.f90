@@ -62,9 +62,8 @@ contains
       call build_system(self%start_case, self%problem, self%system, error)
       if (allocated(error)) return
       call self%solver%start(self%start_case, self%start_case%harmonics, self%system%n)
-      call new_time_structure(case%model, case%contact, case%springs, &
-                              self%system%problem%joint%row > 0, &
-                              self%structure, error)
+      call new_time_structure(case%model, case%contact, case%springs, case%elements, &
+                              self%system%problem%joint%row > 0, self%structure, error)
    end subroutine start
 
    !> Nothing that the summary shows.

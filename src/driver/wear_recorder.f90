@@ -22,7 +22,7 @@ module fw_wear_recorder
    implicit none (type, external)
    private
 
-   public :: wear_recorder, friction_energy
+   public :: wear_recorder, friction_energy, mean_friction
 
    !> Rows are counted by the state of the run.
    type, extends(wear_observer) :: wear_recorder
@@ -108,7 +108,7 @@ contains
       point%wear_rate = state%rate
       point%worn_mu = system%friction()
       point%wear_volume = patch_volumes(self%case%contact, point%depth)
-      call add_energy(self, state, point%dissipation)
+      call add_energy(self, state, point%dissipation, point%worn_mu)
       point%wear_energy = self%energy
       if (.not. self%case%output%contact) then
          deallocate (point%force, point%fraction, point%dissipation)
@@ -171,15 +171,15 @@ contains
    !> Add the friction energy of a step. Its cycles are weighted as its scheme weights them for the
    !> depth: the growth of a pair times its energy over its depth of a cycle, which are two measures
    !> of the same slip, that of forces and displacements and that of the march.
-   subroutine add_energy(self, state, dissipation)
+   subroutine add_energy(self, state, dissipation, mu)
       class(wear_recorder), intent(inout) :: self
       type(wear_state), intent(in) :: state
-      !> Energy per cycle (n_pairs).
-      real(wp), intent(in) :: dissipation(:)
+      !> Energy per cycle, friction coefficients (n_pairs).
+      real(wp), intent(in) :: dissipation(:), mu(:)
       !> Of a rate, as a part of the largest: below it both are round-off, and the law's own measure
       !> stands in.
       real(wp), parameter :: measurable = 1.0e-6_wp
-      real(wp) :: growth(size(dissipation))
+      real(wp), dimension(size(dissipation)) :: growth, mean, factor
       integer :: n
 
       n = size(state%x) - size(dissipation)
@@ -189,10 +189,15 @@ contains
          return
       end if
       growth = state%x(n + 1:) - self%depth
+      mean = mean_friction(self%case, self%depth, state%x(n + 1:))
+      ! Under Archard's law the energy of a depth goes with friction, which moves within the step.
+      factor = 1.0_wp
+      if (self%case%wear%law /= wear_energy) where (mu > 0.0_wp) factor = mean/mu
       where (state%rate > measurable*maxval(state%rate))
-         self%energy = self%energy + growth*dissipation/state%rate
+         self%energy = self%energy + growth*dissipation/state%rate*factor
       else where
-         self%energy = self%energy + friction_energy(self%case, growth + self%case%contact%depth)
+         self%energy = self%energy + friction_energy(self%case, growth + self%case%contact%depth, &
+                                                     mean)
       end where
       self%depth = state%x(n + 1:)
    end subroutine add_energy
@@ -212,15 +217,30 @@ contains
 
    !> Friction energy that the depth worn by this run stands for: both laws wear in proportion
    !> to it.
-   pure function friction_energy(case, depth) result(energy)
+   pure function friction_energy(case, depth, mu) result(energy)
       type(case_type), intent(in) :: case
-      real(wp), intent(in) :: depth(:)
+      !> Depths, and the mean friction on the way to them (n_pairs).
+      real(wp), intent(in) :: depth(:), mu(:)
       real(wp) :: energy(size(depth))
 
       ! A w/k_w is the friction energy under the law of energy; under Archard's the energy is mu of
       ! it.
       energy = case%contact%area*(depth - case%contact%depth)/case%wear%coefficient
-      if (case%wear%law /= wear_energy) energy = case%contact%mu*energy
+      if (case%wear%law /= wear_energy) energy = mu*energy
    end function friction_energy
+
+   !> Mean friction between two depths.
+   pure function mean_friction(case, before, after) result(mean)
+      type(case_type), intent(in) :: case
+      real(wp), intent(in) :: before(:), after(:)
+      real(wp) :: mean(size(before))
+
+      associate (contact => case%contact)
+         mean = contact%mu
+         if (allocated(contact%worn_friction)) then
+            mean = contact%worn_friction%mean_between(contact%mu, before, after)
+         end if
+      end associate
+   end function mean_friction
 
 end module fw_wear_recorder

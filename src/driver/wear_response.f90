@@ -18,7 +18,7 @@ module fw_wear_response
       wear_observer
    use fw_wear_joint, only: stand_at, wear_joint
    use fw_wear_options, only: wear_explicit, wear_pseudo_time
-   use fw_wear_recorder, only: friction_energy, wear_recorder
+   use fw_wear_recorder, only: friction_energy, mean_friction, wear_recorder
    use fw_wear_group, only: wear_halved, wear_outcome, wear_patches
    use fw_wear_step, only: new_wear_stepper, wear_state
    use fw_wear_system, only: wear_system
@@ -278,7 +278,8 @@ contains
       end do
       recorder%n_rows = restart%n_rows
       recorder%depth = restart%state%x(system%n_vibration() + 1:)
-      recorder%energy = friction_energy(recorder%case, recorder%depth)
+      recorder%energy = friction_energy(recorder%case, recorder%depth, mean_friction( &
+                                        recorder%case, recorder%case%contact%depth, recorder%depth))
       if (allocated(restart%energy)) recorder%energy = restart%energy
       call recorder%finer%take_notes(restart%control(c_noted:))
       call restart%give_control(march)

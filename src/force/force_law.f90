@@ -454,8 +454,8 @@ contains
       grows = allocated(self%gap_growth) .or. allocated(self%load_growth)
    end function grows
 
-   !> The constant part of the inputs, before evaluations at `work%rate`.
-   !> The constant part of the inputs, before evaluations, and what wear does to friction.
+   !> The constant part of the inputs, before evaluations at `work%rate`, and what wear does to
+   !> friction.
    pure subroutine set_offset(self, depth, work)
       class(force_law), intent(in) :: self
       !> Wear depth, on top of the gap (n_elements) [length].

@@ -46,7 +46,6 @@ module fw_pair_law
       procedure :: set_friction
       procedure :: take_friction
       procedure :: friction_of
-      procedure :: friction_rests
       procedure :: located
    end type pair_law
 
@@ -329,17 +328,6 @@ contains
       mu = self%mu(element)
       if (allocated(self%worn)) mu = work%mu(element)
    end function friction_of
-
-   !> Whether no friction is further from where wear leads it than this part of its range.
-   pure logical function friction_rests(self, work, part) result(rests)
-      class(pair_law), intent(in) :: self
-      type(force_workspace), intent(in) :: work
-      real(wp), intent(in) :: part
-
-      rests = .true.
-      if (allocated(self%worn)) rests = all(abs(work%mu - self%worn%final) <= &
-                                            part*max(self%mu, self%worn%final))
-   end function friction_rests
 
    !> A pair without friction or load holds nothing tangentially.
    pure real(wp) function slope_at_rest(self, element, component) result(slope)

@@ -4,6 +4,7 @@
 !>   by energy   dw = k S/A and dE = mu S: mu = mu_f/(1 - (1 - mu_f/mu_0) exp(-mu_f a w)),
 !>               which is mu_0/(1 + mu_0 a w) where mu_f vanishes
 module fw_worn_friction
+   use fw_gauss_points, only: gauss_rule
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -20,6 +21,7 @@ module fw_worn_friction
       procedure :: changes
       procedure :: of_pairs
       procedure :: at_depth
+      procedure :: mean_between
    end type worn_friction
 
 contains
@@ -68,5 +70,24 @@ contains
          end if
       end do
    end subroutine at_depth
+
+   !> Mean of mu over the depths of a step: what the energy of its sliding goes by.
+   pure function mean_between(self, first, before, after) result(mean)
+      class(worn_friction), intent(in) :: self
+      !> mu_0, and depths (n_pairs).
+      real(wp), intent(in) :: first(:), before(:), after(:)
+      real(wp) :: mean(size(first))
+      ! Of exp(-a w) they leave 1e-12 where a step is as long as 3/a.
+      integer, parameter :: n_points = 7
+      real(wp) :: points(n_points), weights(n_points), mu(size(first)), growth(size(first))
+      integer :: k
+
+      call gauss_rule(points, weights)
+      mean = 0.0_wp
+      do k = 1, n_points
+         call self%at_depth(first, before + points(k)*(after - before), mu, growth)
+         mean = mean + weights(k)*mu
+      end do
+   end function mean_between
 
 end module fw_worn_friction

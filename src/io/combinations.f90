@@ -11,7 +11,7 @@ module fw_combinations
    use fw_rules, only: apply_rules
    use fw_solver_options, only: scheme_implicit_euler
    use fw_text, only: to_text
-   use fw_wear_options, only: wear_explicit, wear_pseudo_time
+   use fw_wear_options, only: mu_by_depth, wear_explicit, wear_pseudo_time
    implicit none (type, external)
    private
 
@@ -34,6 +34,7 @@ contains
       if (.not. allocated(error)) call check_loads(case, error)
       if (.not. allocated(error)) call require_sectors(case, error)
       if (.not. allocated(error)) call check_order(case, error)
+      if (.not. allocated(error)) call check_friction(case, error)
    end subroutine check_combinations
 
    !> A load of a harmonic that is left out would not act.
@@ -125,6 +126,22 @@ contains
                           'leave wear%order out', status_input)
       end if
    end subroutine check_order
+
+   !> Friction that grows from nothing with the depth: the forces have no part by which it grows.
+   subroutine check_friction(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      if (case%wear%mu_by /= mu_by_depth) return
+      do i = 1, case%contact%n_pairs
+         if (case%contact%mu(i) > 0.0_wp .or. case%wear%mu_final(i) <= 0.0_wp) cycle
+         call fatal_error(error, "wear%mu_by = 'depth': contact%mu = 0 of pair "//to_text(i)// &
+                          ' cannot grow to wear%mu_final = '//to_text(case%wear%mu_final(i))// &
+                          ': give it a small one, such as 1e-3 of mu_final', status_input)
+         return
+      end do
+   end subroutine check_friction
 
    !> A piece of a sweep lies within it.
    subroutine check_piece(case, error)

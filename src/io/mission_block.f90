@@ -7,7 +7,7 @@ module fw_mission_block
    use fw_kinds, only: wp
    use fw_read_mission, only: split_change
    use fw_text, only: string_type, to_text
-   use fw_wear_options, only: mu_by_energy
+   use fw_wear_options, only: mu_by_energy, wear_archard
    implicit none (type, external)
    private
 
@@ -48,6 +48,9 @@ contains
                   differs(case%wear%coefficient, block%wear%coefficient)) then
             what = "has other wear%coefficient than the case, with wear%mu_by = 'energy': its "// &
                    "depth would not tell the energy; use 'depth'"
+         else if (changes_energy(case, block)) then
+            what = "has other friction than the case, with wear%mu_by = 'energy': its depth "// &
+                   "would not tell the energy; use 'depth', or wear%law = 'energy'"
          else if (block%harmonics%n_harmonics > case%harmonics%n_harmonics) then
             what = 'has more harmonics than the case, whose rows hold '// &
                    to_text(case%harmonics%n_harmonics)
@@ -63,6 +66,17 @@ contains
                        trim(case%mission%title(number))//' '//what//': the blocks of a mission '// &
                        'wear the same pairs', status_input)
    end subroutine check_alike
+
+   !> Whether energy follows from the depth by the friction on the way, and that is another one.
+   pure logical function changes_energy(case, block)
+      type(case_type), intent(in) :: case, block
+
+      changes_energy = .false.
+      if (case%wear%mu_by /= mu_by_energy .or. case%wear%law /= wear_archard) return
+      changes_energy = differs(case%contact%mu, block%contact%mu) .or. &
+                       differs(case%wear%mu_final, block%wear%mu_final) .or. &
+                       differs(case%wear%mu_scale, block%wear%mu_scale)
+   end function changes_energy
 
    pure logical function differs(a, b)
       real(wp), intent(in) :: a(:), b(:)

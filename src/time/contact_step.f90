@@ -4,6 +4,7 @@
 !>   normal      lambda_n <= 0, s_n >= 0, lambda_n s_n = 0          (Signorini),
 !>   tangential  |lambda_t| <= mu |lambda_n|, in slip lambda_t = mu |lambda_n| s_t/|s_t|  (Coulomb),
 !>   springs     lambda = coefficient s**power,
+!>   elements    lambda = f(s, ds/dt) of their rows together,
 !>   others      lambda = f(s, ds/dt) at the middle of the step (laws that act at once).
 !>
 !> s measures from where the pair would stay closed and stuck. W is the Delassus operator, with
@@ -11,9 +12,10 @@
 !> springs. Semismooth Newton on the projections (Alart and Curnier 1991); where it cycles,
 !> projected Gauss-Seidel sweeps (Jean 1999).
 module fw_contact_step
+   use fw_instant_law, only: element_motion, reserve_motion
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
-   use fw_time_structure, only: time_structure
+   use fw_time_structure, only: element_rows, time_structure
    implicit none (type, external)
    private
 
@@ -28,13 +30,19 @@ module fw_contact_step
    !> round-off of the smallest steps, the looser one will do.
    real(wp), parameter :: tolerance = 1.0e-10_wp, loose_tolerance = 1.0e-7_wp
 
+   !> One instant of the elements of a kind, and df/ds (output, input, element).
+   type :: element_slopes
+      type(element_motion) :: motion
+      real(wp), allocatable :: slope(:, :, :)
+   end type element_slopes
+
    type :: contact_problem
       !> Forces of the rows (n_rows), kept as the first guess of the next step.
       real(wp), allocatable :: force(:)
       !> Where the pair would stay without force (n_rows).
       real(wp), allocatable :: free(:)
-      !> Of rows of pairs that act at once: relative displacement at the start of the step, and
-      !> velocity in its middle over what the displacement gains up to there (n_rows).
+      !> Of rows of pairs that act at once and of elements: relative displacement at the start of
+      !> the step, and velocity in its middle over what the displacement gains up to there (n_rows).
       real(wp), allocatable :: start(:), speed(:)
       !> Whether the gap of the pair is closed, so that it may bear (n_pairs).
       logical, allocatable :: closed(:)
@@ -47,6 +55,7 @@ module fw_contact_step
       !> (component, component, n_pairs).
       real(wp), allocatable :: rate(:), mismatch(:), relative(:), slope(:, :, :)
       type(lu_type) :: lu
+      type(element_slopes), allocatable :: elements(:)
    contains
       procedure :: solve
    end type contact_problem
@@ -57,7 +66,7 @@ contains
    pure function new_contact_problem(structure) result(self)
       type(time_structure), intent(in) :: structure
       type(contact_problem) :: self
-      integer :: n
+      integer :: k, n
 
       n = structure%n_rows
       allocate (self%force(n), self%free(n), self%rate(n), self%mismatch(n), self%relative(n), &
@@ -66,6 +75,15 @@ contains
       allocate (self%state(structure%n_pairs), source=state_stick)
       allocate (self%slope(3, 3, structure%n_pairs), source=0.0_wp)
       call self%lu%reserve(n)
+      allocate (self%elements(size(structure%elements)))
+      do k = 1, size(self%elements)
+         associate (own => self%elements(k), kind => structure%elements(k))
+            n = size(kind%row, 1)
+            call reserve_motion(n, 1, kind%law%needs_scratch, own%motion)
+            own%motion%wants_slopes = .true.
+            allocate (own%slope(n, n, size(kind%row, 2)), source=0.0_wp)
+         end associate
+      end do
    end function new_contact_problem
 
    !> Solve for the forces with the operator w (n_rows, n_rows); `done` is false where neither
@@ -123,7 +141,7 @@ contains
       type(contact_problem), intent(inout) :: self
       type(time_structure), intent(in) :: structure
       real(wp), intent(in) :: w(:, :)
-      integer :: i, r
+      integer :: i, k, r
 
       ! The largest force so far, not of this step: between two contacts all forces vanish.
       self%scale = max(self%scale, maxval(abs(self%force)))
@@ -137,6 +155,11 @@ contains
          else
             call project_pair(self, structure, i)
          end if
+      end do
+      do k = 1, size(self%elements)
+         do i = 1, size(structure%elements(k)%row, 2)
+            call follow_element(structure%elements(k), i, self, self%elements(k))
+         end do
       end do
       ! A spring knows no states: its force is a function of s, and the mismatch its residual.
       do i = 1, structure%n_springs
@@ -229,6 +252,37 @@ contains
       end do
    end subroutine follow_pair
 
+   !> One element: mismatch lambda - f of its rows, and slope = df/ds (output, input).
+   subroutine follow_element(kind, i, self, own)
+      type(element_rows), intent(in) :: kind
+      integer, intent(in) :: i
+      type(contact_problem), intent(inout) :: self
+      type(element_slopes), intent(inout) :: own
+      integer :: c, r
+
+      associate (motion => own%motion)
+         motion%element = i
+         motion%u = 0.0_wp
+         motion%v = 0.0_wp
+         motion%by_u = 0.0_wp
+         motion%by_v = 0.0_wp
+         do c = 1, size(kind%row, 1)
+            r = kind%row(c, i)
+            if (r == 0) cycle
+            motion%u(c, 1) = self%relative(r)
+            motion%v(c, 1) = self%speed(r)*(self%relative(r) - self%start(r))
+         end do
+         call kind%law%act(motion)
+         own%slope(:, :, i) = 0.0_wp
+         do c = 1, size(kind%row, 1)
+            r = kind%row(c, i)
+            if (r == 0) cycle
+            self%mismatch(r) = self%force(r) - motion%force(c, 1)
+            own%slope(:, c, i) = motion%by_u(c, :, 1) + self%speed(r)*motion%by_v(c, :, 1)
+         end do
+      end associate
+   end subroutine follow_element
+
    !> force <- force - J^-1 mismatch, J = 1 - slope (1 - rate W).
    subroutine newton_step(self, structure, w, singular)
       type(contact_problem), intent(inout) :: self
@@ -236,7 +290,7 @@ contains
       real(wp), intent(in) :: w(:, :)
       logical, intent(out) :: singular
       real(wp) :: tangent
-      integer :: i, c, d, r, q
+      integer :: i, c, d, k, r, q
 
       associate (jacobian => self%lu%matrix)
          ! ds = -W dlambda, so that y = lambda + rate s has dy = (1 - rate W) dlambda.
@@ -259,6 +313,19 @@ contains
                   jacobian(r, q) = jacobian(r, q) - self%slope(c, d, i)
                   ! 1 - slope (1 - rate W), row by row.
                   jacobian(r, :) = jacobian(r, :) + self%slope(c, d, i)*self%rate(q)*w(q, :)
+               end do
+            end do
+         end do
+         do k = 1, size(self%elements)
+            do i = 1, size(structure%elements(k)%row, 2)
+               do c = 1, size(structure%elements(k)%row, 1)
+                  r = structure%elements(k)%row(c, i)
+                  if (r == 0) cycle
+                  do d = 1, size(structure%elements(k)%row, 1)
+                     q = structure%elements(k)%row(d, i)
+                     if (q > 0) jacobian(r, :) = jacobian(r, :) + &
+                                                 self%elements(k)%slope(c, d, i)*w(q, :)
+                  end do
                end do
             end do
          end do
@@ -308,6 +375,7 @@ contains
                self%relative = self%relative - w(:, r)*change
             end do
          end do
+         call sweep_elements(self, structure, w)
          ! By Newton's method on the spring's own row: the others stand still meanwhile.
          do i = 1, structure%n_springs
             r = structure%n_rows - structure%n_springs + i
@@ -320,5 +388,28 @@ contains
          end do
       end do
    end subroutine sweep
+
+   !> Each element in turn: Newton steps of its rows by their own slopes.
+   subroutine sweep_elements(self, structure, w)
+      type(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: w(:, :)
+      real(wp) :: change
+      integer :: c, i, k, r
+
+      do k = 1, size(self%elements)
+         do i = 1, size(structure%elements(k)%row, 2)
+            call follow_element(structure%elements(k), i, self, self%elements(k))
+            do c = 1, size(structure%elements(k)%row, 1)
+               r = structure%elements(k)%row(c, i)
+               if (r == 0) cycle
+               change = -self%mismatch(r)/(1.0_wp + w(r, r)* &
+                                           max(self%elements(k)%slope(c, c, i), 0.0_wp))
+               self%force(r) = self%force(r) + change
+               self%relative = self%relative - w(:, r)*change
+            end do
+         end do
+      end do
+   end subroutine sweep_elements
 
 end module fw_contact_step

@@ -1,5 +1,5 @@
-!> Integration over a period without contact, springs only, by CVODE (Hindmarsh et al. 2005):
-!> Adams-Moulton formulas of variable order and step to tolerances near round-off, values at
+!> Integration over a period without contact, springs and elements only, by CVODE (Hindmarsh et al.
+!> 2005): Adams-Moulton formulas of variable order and step to tolerances near round-off, values at
 !> uniform instants from its dense output. For structures with a regular mass whose highest
 !> frequency is not far above that of the load; others go through fw_time_stepper.
 module fw_smooth_integration
@@ -15,13 +15,14 @@ module fw_smooth_integration
    use fsundials_nvector_mod, only: fn_vdestroy, fn_vgetarraypointer, n_vector
    use fsunlinsol_dense_mod, only: fsunlinsol_dense
    use fsunmatrix_dense_mod, only: fsundensematrix
+   use fw_instant_law, only: element_motion, reserve_motion
    use fw_interrupt, only: must_end
    use fw_kinds, only: i8, pi, wp
    use fw_linalg, only: lu_type
    use fw_load_waves, only: load_waves
    use fw_period_record, only: new_period_record, period_record
    use fw_periodic_state, only: period_map
-   use fw_time_structure, only: time_structure
+   use fw_time_structure, only: element_rows, time_structure
    implicit none (type, external)
    private
 
@@ -35,15 +36,21 @@ module fw_smooth_integration
    real(wp), parameter :: moderate_ratio = 200.0_wp
    integer(c_long), parameter :: max_steps = 1000000_c_long
 
-   !> In tau = omega t, with w = dx/dtau: dw/dtau = load - stiffness x - damping w - springs, all
-   !> divided by the mass and omega**2, so that both halves of the state have one unit.
+   !> In tau = omega t, with w = dx/dtau: dw/dtau = load - stiffness x - damping w - springs -
+   !> elements, all divided by the mass and omega**2, so that both halves of the state have one
+   !> unit.
    type :: acceleration_type
       integer :: n = 0
       !> Stiffness and damping (n, n), loads (n, n_columns) and rows of springs (n, n_springs).
       real(wp), allocatable :: stiffness(:, :), damping(:, :), load(:, :), springs(:, :)
-      !> Springs as they are: rows of B (n, n_springs), coefficients and powers.
+      !> Springs as they are: rows of B (n, n_springs) behind those of elements, coefficients and
+      !> powers.
       real(wp), allocatable :: rows(:, :), coefficient(:)
       integer, allocatable :: power(:)
+      !> Kinds of elements, and an instant of each.
+      type(element_rows), allocatable :: elements(:)
+      type(element_motion), allocatable :: motion(:)
+      real(wp) :: omega = 0.0_wp
       !> What the loads behind the third are; their frequency is in them.
       type(load_waves) :: waves
    end type acceleration_type
@@ -104,7 +111,7 @@ contains
       type(acceleration_type), intent(out) :: acceleration
       type(lu_type) :: mass
       logical :: singular
-      integer :: w
+      integer :: k, w
 
       acceleration%n = structure%n_dof
       call mass%reserve(structure%n_dof)
@@ -123,6 +130,13 @@ contains
       acceleration%springs = structure%rows
       acceleration%coefficient = structure%coefficient
       acceleration%power = structure%power
+      acceleration%omega = omega
+      acceleration%elements = structure%elements
+      allocate (acceleration%motion(size(acceleration%elements)))
+      do k = 1, size(acceleration%elements)
+         call reserve_motion(size(acceleration%elements(k)%row, 1), 1, &
+                             acceleration%elements(k)%law%needs_scratch, acceleration%motion(k))
+      end do
       call solve_columns(mass, acceleration%stiffness)
       call solve_columns(mass, acceleration%damping)
       call solve_columns(mass, acceleration%load)
@@ -155,7 +169,7 @@ contains
       type(c_ptr), value :: user_data
       type(acceleration_type), pointer :: a
       real(c_double), pointer :: y(:), slope(:)
-      integer :: i, n
+      integer :: i, k, n
 
       call c_f_pointer(user_data, a)
       y => fn_vgetarraypointer(y_vector)
@@ -171,12 +185,45 @@ contains
       do i = 1, n
          slope(n + 1:2*n) = slope(n + 1:2*n) - y(i)*a%stiffness(:, i) - y(n + i)*a%damping(:, i)
       end do
+      k = size(a%rows, 2) - size(a%coefficient)
       do i = 1, size(a%coefficient)
-         slope(n + 1:2*n) = slope(n + 1:2*n) - a%springs(:, i)*a%coefficient(i)* &
-                            dot_product(a%rows(:, i), y(:n))**a%power(i)
+         slope(n + 1:2*n) = slope(n + 1:2*n) - a%springs(:, k + i)*a%coefficient(i)* &
+                            dot_product(a%rows(:, k + i), y(:n))**a%power(i)
+      end do
+      do k = 1, size(a%elements)
+         do i = 1, size(a%elements(k)%row, 2)
+            call push(a, a%elements(k), a%motion(k), i, y, slope(n + 1:2*n))
+         end do
       end do
       status = 0
    end function evaluate
+
+   !> What an element adds to the accelerations.
+   subroutine push(a, kind, motion, element, y, acceleration)
+      type(acceleration_type), intent(in) :: a
+      type(element_rows), intent(in) :: kind
+      type(element_motion), intent(inout) :: motion
+      integer, intent(in) :: element
+      !> Positions, and their rates by tau (2 n).
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(inout) :: acceleration(:)
+      integer :: c, r
+
+      motion%element = element
+      motion%u = 0.0_wp
+      motion%v = 0.0_wp
+      do c = 1, size(kind%row, 1)
+         r = kind%row(c, element)
+         if (r == 0) cycle
+         motion%u(c, 1) = dot_product(a%rows(:, r), y(:a%n))
+         motion%v(c, 1) = a%omega*dot_product(a%rows(:, r), y(a%n + 1:))
+      end do
+      call kind%law%act(motion)
+      do c = 1, size(kind%row, 1)
+         r = kind%row(c, element)
+         if (r > 0) acceleration = acceleration - a%springs(:, r)*motion%force(c, 1)
+      end do
+   end subroutine push
 
    !> One period from a state (displacements, velocities); see period_map.
    subroutine integrate(self, start, finish, range, done)

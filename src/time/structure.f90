@@ -3,33 +3,46 @@
 !>   M u'' + C u' + K u + B^T lambda = f_0 + f_c cos(omega t) + f_s sin(omega t) + ..
 !>
 !> Rows of B are the relative displacements u(side_1) - u(side_2) of the components in use, pair by
-!> pair, then of the springs. The mass may be singular: its massless directions are separated by
-!> an orthogonal projection and follow the others without inertia.
+!> pair, then of the other elements, then of the springs. The mass may be singular: its massless
+!> directions are separated by an orthogonal projection and follow the others without inertia.
 module fw_time_structure
    use fw_kinds, only: wp
    use fw_contact_data, only: contact_type, spring_type
-   use fw_error, only: error_type, fatal_error, status_failure
+   use fw_element_group, only: element_group
+   use fw_elements, only: element_list
+   use fw_error, only: error_type, fatal_error, status_failure, status_input
+   use fw_force_law, only: force_law
+   use fw_instant_law, only: as_instant_law, instant_law
    use fw_lapack, only: dgemm, dsyevd
    use fw_laws, only: build_law
    use fw_load_waves, only: load_waves
    use fw_model, only: model_type
    use fw_pair_law, only: pair_law
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: time_structure, new_time_structure
+   public :: element_rows, time_structure, new_time_structure
 
    !> Share of the largest eigenvalue of the scaled mass below which a direction is massless.
    real(wp), parameter :: massless_tolerance = 1.0e-12_wp
    !> Part of a row of B that must lie in the massless directions to count.
    real(wp), parameter :: massless_part = 1.0e-9_wp
 
+   !> Elements of one kind, whose forces follow from their rows and the rates of these.
+   type :: element_rows
+      class(instant_law), allocatable :: law
+      !> Row of each input, 0 where there is none (n_in, n_elements).
+      integer, allocatable :: row(:, :)
+   end type element_rows
+
    type :: time_structure
       integer :: n_dof = 0
       integer :: n_pairs = 0
       integer :: n_springs = 0
-      !> Rows of B: components of pairs, then springs.
+      !> Rows of B: components of pairs, then inputs of other elements, then springs.
       integer :: n_rows = 0
+      integer :: n_element_rows = 0
       !> Matrices (n_dof, n_dof); the stiffness is without springs and contact.
       real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :)
       !> Loads in columns (n_dof, n_columns) [force], and what these are.
@@ -50,6 +63,8 @@ module fw_time_structure
       class(pair_law), allocatable :: law
       logical, allocatable :: at_once(:)
       real(wp), allocatable :: depth(:)
+      !> Kinds of elements.
+      type(element_rows), allocatable :: elements(:)
       !> Springs: force coefficient * e**power (n_springs).
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
@@ -62,13 +77,15 @@ module fw_time_structure
 contains
 
    !> Prepare a model; `present` marks the components of the pairs that are in use (3, n_pairs).
-   subroutine new_time_structure(model, contact, springs, present, self, error)
+   subroutine new_time_structure(model, contact, springs, elements, present, self, error)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
+      type(element_list), intent(in) :: elements
       logical, intent(in) :: present(:, :)
       type(time_structure), intent(out) :: self
-      !> status_failure where the eigenvalues of the mass cannot be computed.
+      !> status_failure where the eigenvalues of the mass cannot be computed, status_input where
+      !> elements cannot be integrated.
       type(error_type), allocatable, intent(out) :: error
 
       self%n_dof = model%n_dof
@@ -80,8 +97,11 @@ contains
       self%load = model%load_columns()
       self%waves = model%waves
       call take_pairs(contact, present, self)
+      allocate (self%elements(0))
+      call take_elements(elements, self)
       call take_springs(springs, self)
       call find_massless(self, error)
+      if (.not. allocated(error)) call check_rates(self, error)
    end subroutine new_time_structure
 
    !> Components that an elastic law gives no stiffness transmit nothing and are left out.
@@ -123,7 +143,76 @@ contains
       end do
    end subroutine take_pairs
 
-   !> Rows of springs behind those of the pairs: their elongations.
+   !> Rows of elements behind those of the pairs: their inputs. Functions of a user are left out.
+   subroutine take_elements(elements, self)
+      type(element_list), intent(in) :: elements
+      type(time_structure), intent(inout) :: self
+      type(element_rows) :: kind
+      class(force_law), allocatable :: law
+      integer :: k
+
+      if (.not. allocated(elements%slot)) return
+      do k = 1, size(elements%slot)
+         if (elements%slot(k)%group%n_elements == 0 .or. &
+             allocated(elements%slot(k)%group%function)) cycle
+         call elements%slot(k)%group%make_law(1, law)
+         call as_instant_law(law, kind%law)
+         if (.not. allocated(kind%law)) cycle
+         call take_inputs(elements%slot(k)%group, self, kind%row)
+         self%elements = [self%elements, kind]
+      end do
+   end subroutine take_elements
+
+   !> Rows of the inputs of a kind.
+   subroutine take_inputs(group, self, row)
+      class(element_group), intent(in) :: group
+      type(time_structure), intent(inout) :: self
+      integer, allocatable, intent(out) :: row(:, :)
+      real(wp), allocatable :: rows(:, :)
+      integer :: c, i, n
+
+      n = group%n_in*group%n_elements
+      allocate (row(group%n_in, group%n_elements), source=0)
+      allocate (rows(self%n_dof, size(self%rows, 2) + n), source=0.0_wp)
+      rows(:, :self%n_rows) = self%rows(:, :self%n_rows)
+      call move_alloc(rows, self%rows)
+      n = self%n_rows
+      do i = 1, group%n_elements
+         do c = 1, group%n_in
+            if (group%row_side_1(c, i) == 0 .and. group%row_side_2(c, i) == 0) cycle
+            self%n_rows = self%n_rows + 1
+            row(c, i) = self%n_rows
+            call add_side(self, group%row_side_1(c, i), 1.0_wp)
+            call add_side(self, group%row_side_2(c, i), -1.0_wp)
+         end do
+      end do
+      ! As a spring an element is its own law: nothing yields in series with it.
+      self%compliance = [self%compliance(:n), (0.0_wp, i=n + 1, self%n_rows)]
+      self%n_element_rows = self%n_element_rows + self%n_rows - n
+   end subroutine take_inputs
+
+   !> The rate of a row that moves without inertia, in part or altogether, is no part of a state.
+   subroutine check_rates(self, error)
+      type(time_structure), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: c, i, k
+
+      do k = 1, size(self%elements)
+         if (.not. self%elements(k)%law%takes_rates) cycle
+         do i = 1, size(self%elements(k)%row, 2)
+            do c = 1, size(self%elements(k)%row, 1)
+               if (self%elements(k)%row(c, i) == 0) cycle
+               if (.not. self%massless(self%elements(k)%row(c, i))) cycle
+               call fatal_error(error, "case%analysis = 'time': element "//to_text(i)//' of '// &
+                                '&damper acts on a dof without mass; give the dof a mass, or '// &
+                                "use 'frf' or 'point'", status_input)
+               return
+            end do
+         end do
+      end do
+   end subroutine check_rates
+
+   !> Rows of springs behind those of pairs and elements: their elongations.
    subroutine take_springs(springs, self)
       type(spring_type), intent(in) :: springs
       type(time_structure), intent(inout) :: self

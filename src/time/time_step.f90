@@ -101,8 +101,10 @@ contains
                end if
             end do
          end do
-         do r = s%n_rows - s%n_springs + 1, s%n_rows
+         do r = s%n_rows - s%n_springs - s%n_element_rows + 1, s%n_rows
             free(r) = self%row_increment(r) + self%row_position(r)
+            self%contact%start(r) = self%row_position(r)
+            self%contact%speed(r) = merge(1.0_wp, 2.0_wp, s%massless(r))/h
          end do
       end associate
    end subroutine set_references

@@ -11,7 +11,7 @@ module fw_wear_options
    public :: follow_range
    public :: wear_explicit, wear_implicit, wear_pseudo_time
    public :: wear_archard, wear_energy
-   public :: mu_by_energy, mu_by_none
+   public :: mu_by_depth, mu_by_energy, mu_by_none
 
    character(*), parameter :: wear_scheme_words(*) = &
       [character(11) :: 'explicit', 'implicit', 'pseudo_time']

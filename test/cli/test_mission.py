@@ -16,7 +16,8 @@ SLIDING = json.loads((LAWS / "wear_mission.json").read_text())["cases"]
 VIBRATING = json.loads((LAWS / "wear_mission_vibration.json").read_text())["cases"]["vibrating"]
 # Marches of order 3 with steps of this error, over some hundred of them.
 STEP, MARCHED = 1e-9, 1e-10
-# Rates that change with friction: some ten steps, each as accurate as STEP.
+# Rates that change with friction: tolerances of 1e-8 to 1e-11 leave what they say, over all steps
+# together; a margin of ten.
 RUBBED = 10.0 * STEP
 
 
@@ -110,9 +111,9 @@ def test_friction_of_elastic_pairs(tmp_path, by):
         found = result(tmp_path, merged(groups, changed))
         assert found["wear/mu"][-1, 0] < 0.9 * found["wear/mu"][0, 0]
         depth[scheme] = found["wear/depth"][-1, 0]
-    # Some tens of steps of 1e-6.
-    assert abs(depth["explicit"] / depth["implicit"] - 1.0) < 1e-4
-    assert abs(depth["pseudo_time"] / depth["implicit"] - 1.0) < 1e-4
+    # Each leaves about its tolerance; a margin of ten.
+    assert abs(depth["explicit"] / depth["implicit"] - 1.0) < 1e-5
+    assert abs(depth["pseudo_time"] / depth["implicit"] - 1.0) < 1e-5
 
 
 def test_friction_by_energy(tmp_path):
@@ -126,12 +127,38 @@ def test_friction_by_energy(tmp_path):
     energy = np.array([row["energy"] for row in rows])
     np.testing.assert_allclose(found["wear/mu"][:, 0], p["mu_final"] + (p["mu"] - p["mu_final"])
                                * np.exp(-energy / p["mu_energy"]), rtol=RUBBED)
-    # The energy that the depth stands for, weighted step by step.
-    np.testing.assert_allclose(found["wear/energy"][:, 0], energy, rtol=1e-3)
-    other = merged(sliding("mu_energy"), {"wear": changed})
-    other["mission"]["change"][1] += "; wear%coefficient = 2e-3"
-    done = run(tmp_path, other, status=3)
-    assert "wear%coefficient" in done.stderr
+    np.testing.assert_allclose(found["wear/energy"][:, 0], energy, rtol=RUBBED)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ("wear%coefficient = 2e-3", "wear%coefficient"), ("contact%mu = 0.3", "other friction"),
+    ("wear%mu_final = 0.1", "other friction"), ("wear%mu_scale = 3.0", "other friction")])
+def test_depth_that_would_not_tell_the_energy(tmp_path, change, words):
+    groups = merged(sliding("mu_energy"), {"wear": {"mu_by": "energy", "mu_final": 0.2,
+                                                    "mu_scale": 2.0}})
+    groups["mission"]["change"][1] += "; " + change
+    done = run(tmp_path, groups, status=3)
+    assert words in done.stderr
+    assert "use 'depth'" in done.stderr
+
+
+def test_friction_that_cannot_grow(tmp_path):
+    groups = merged(sliding("plain"), {"contact": {"mu": 0.0}, "wear": {
+        "mu_by": "depth", "mu_final": 0.2, "mu_scale": 0.01}})
+    done = run(tmp_path, groups, status=3)
+    assert "contact%mu = 0 of pair 1 cannot grow to wear%mu_final" in done.stderr
+
+
+def test_friction_on_its_way_is_no_gross_slip(tmp_path):
+    """Rates that hardly change although friction has yet to: the mission goes on."""
+    def ending(**changes):
+        groups = merged(shared_load(error_tolerance=1e-4), {
+            "load": {"cosine": [3.0, 3.0, 0.0, 0.0, 0.0]}, "wear": changes})
+        blocks = [(20.0, ""), (20.0, "load%harmonic_scale = 0.9")]
+        return result(tmp_path, mission(groups, blocks, 40))["attributes"]["steady_state"]
+
+    assert ending() == "none: gross slip"
+    assert ending(mu_by="depth", mu_final=0.1, mu_scale=100.0) == "not reached"
 
 
 @pytest.mark.parametrize(("order", "error"), [(3, 1e-3), (7, 1e-4), (15, 2e-5)])
@@ -249,7 +276,8 @@ def slow(per_jump, tolerance=STEP, n_flights=64):
 
 
 def test_jumps(tmp_path):
-    """Of second order in their length; by the error within what the file says."""
+    """Of second order in their length, order of the blocks included; by the error within what the
+    file says."""
     exact = result(tmp_path, slow(1))["mission/depth"][:, 0]
     error = []
     for per_jump in (8, 16, 32):
@@ -257,9 +285,10 @@ def test_jumps(tmp_path):
         flown = np.isfinite(found)
         assert flown.nonzero()[0].tolist() == list(range(0, 65, per_jump))
         error.append(found[-1] - exact[-1])
-    # Beside what the order of the blocks within a flight is worth, which no jump keeps.
     assert 3.8 < (error[2] - error[1]) / (error[1] - error[0]) < 4.2
-    assert abs(error[0]) < np.diff(exact).max()
+    # A flight by itself has none.
+    assert 3.5 < error[2] / error[1] < 4.5
+    assert abs(error[0]) < 0.1 * np.diff(exact).max()
     for tolerance in (1e-2, 1e-3, 1e-4):
         write_namelist(tmp_path / "case.nml", slow(0, tolerance))
         run(tmp_path, slow(0, tolerance))
@@ -268,9 +297,7 @@ def test_jumps(tmp_path):
             stated = file["mission"].attrs["jump_error"]
         flown = np.isfinite(depth)
         assert flown[-1]
-        off = np.abs(depth - exact)[flown].max()
-        assert off <= stated + np.diff(exact).max()
-        assert off <= 2.0 * tolerance * exact[-1]
+        assert np.abs(depth - exact)[flown].max() <= stated
 
 
 def same(found, expected):

@@ -9,8 +9,11 @@ import pytest
 from cases import merged, read, run
 from scipy.integrate import solve_ivp
 
-#: Of a march of 1,024 steps: its phase, (w step)**2/12 a step.
+#: Of a march of 1,024 steps: its phase, (w step)**3/12 a step, 1e-4 of them all with the fastest
+#: mode of these; a margin of ten.
 MARCHED = 1e-3
+#: What 15 harmonics leave of the motion under the drag |v| v, 1e-4; a margin of ten.
+TRUNCATED = 1e-3
 
 MASS = np.diag([1.0, 0.8])
 STIFFNESS = np.array([[3.0, -1.0], [-1.0, 2.0]])
@@ -95,7 +98,7 @@ def test_multipliers_are_as_integrated(tmp_path, name):
                          atol=1e-12).y[:, -1]
 
     # The balance has found a period of the equations of motion.
-    assert np.abs(period(start) - start).max() < 1e-3
+    assert np.abs(period(start) - start).max() < TRUNCATED
     step = 1e-5
     matrix = np.stack([(period(start + step * e) - period(start - step * e)) / (2.0 * step)
                        for e in np.eye(4)], axis=1)
