@@ -221,13 +221,15 @@ int fw_count(fw_handle handle, const char *what, int *n);
    (n_observed):          "amplitude", largest magnitude over the period
    with group &stress "stress/worst" (1), "stress/amplitude", "stress/mean" and
    "stress/utilisation" (n_stress, of every sector), "stress/coefficients" (2H+1, n_stress, 6)
+   with &cyclic mistuned "blades/largest", "blades/sector" (n_quantities, of a sector) and
+   "blades/content" (n_quantities, n_sectors)
    (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)
    (n_pairs, 3):          "contact/fraction" of the period in stick, slip and open
    (n_pairs):             "contact/dissipation", energy per cycle
    (2H+1, laws, n_in):    "user/force" of laws of your own, and (laws): "user/work" per cycle
    "history/observed", "history/force", "history/relative_displacement",
    "floquet/multipliers", "floquet/stable": where the case asks for them.
-   "sensitivity/QUANTITY/PARAMETER" ([n_observed][, n_pairs]), "sensitivity/deviation/QUANTITY":
+   "sensitivity/QUANTITY/PARAMETER" ([n_observed][, n_pairs or values of sectors]), "sensitivity/deviation/QUANTITY":
    derivatives, with group &sensitivity.
    "mode/damping_ratio", "mode/self_excitation", "mode/modal_amplitude" (1) and
    "mode/first_harmonic" (n_observed): of the points of a nonlinear mode.

@@ -127,7 +127,9 @@ class Resonance(_Resonance, total=False):
                        "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
                        "contact%normal_coefficient", "contact%reference_force",
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
-                       "contact%slip_speed", "contact%mu_dynamic"]
+                       "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
+                       "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
+                       "mistuning%scale"]
     #: first value, or factor; only: analysis = 'resonance' (required, else 0)
     start: float
     #: last value, or factor; only: analysis = 'resonance' (required, else 0)
@@ -552,7 +554,9 @@ class Sweep(_Sweep, total=False):
                        "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness",
                        "contact%normal_coefficient", "contact%reference_force",
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
-                       "contact%slip_speed", "contact%mu_dynamic"]
+                       "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
+                       "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
+                       "mistuning%scale"]
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)

@@ -14,7 +14,9 @@ from fretwear.plot import (
     KINDS,
     Choices,
     fitting,
+    plot_blades,
     plot_campbell,
+    plot_content,
     plot_damping,
     plot_envelope,
     plot_force,
@@ -148,6 +150,31 @@ def test_envelope_of_sweeps(wave: Result, folder: Path) -> None:
     both = [np.interp(frequency, r.frequency[k], r.amplitude_of("u6")[k])
             for r, k in zip((wave, finer), order)]
     assert largest.get_ydata() == pytest.approx(np.max(both, axis=0))
+
+
+def test_blades_and_their_waves(wave: Result, folder: Path) -> None:
+    """Every sector, the largest of all, and what the sectors are made of."""
+    disk = run(DISK, folder / "all.h5", "sweep%n_points=3", "cyclic%mistuned=.true.",
+               "contact%mu(1)=0.8", "harmonics%n_harmonics=3")
+    assert {"wave", "blades", "content"} <= set(fitting(disk))
+    assert not {"blades", "content"} & set(fitting(wave))
+    n = int(disk.attributes["n_sectors"])
+    (axes,) = plot_blades(disk, "u6@2").axes
+    assert len(axes.lines) == n + 1
+    column = disk.index("u6@0")
+    assert axes.lines[-1].get_ydata() == pytest.approx(
+        disk.sector_amplitude[:, :, column].max(axis=1))
+    bars = plot_content(disk, 1, "u6@0").axes[0].patches
+    u = np.array([disk.sector(j)[1, 1, column] - 1j * disk.sector(j)[1, 2, column]
+                  for j in range(n)])
+    k = disk["blades/nodal_diameter"]
+    size = np.abs(np.exp(2j * np.pi * np.outer(k, np.arange(n)) / n) @ u) / n
+    assert [bar.get_height() for bar in bars] == pytest.approx(size)
+    single = run(DISK, folder / "one.h5", "case%analysis=point", "cyclic%mistuned=.true.",
+                 "harmonics%n_harmonics=3")
+    assert len(plot_blades(single).axes[0].patches) == n
+    with pytest.raises(AbsentError, match="mistuned"):
+        plot_content(wave)
 
 
 def test_what_cannot_be_drawn(modes: Result, wave: Result, folder: Path) -> None:

@@ -9,7 +9,8 @@
 !>   v_0, mu_d      of friction at a sliding speed, and mu where it weakens with the speed: dT with
 !>                  the inputs held
 !>   coefficient    the force of a unit coefficient
-!>   loads, matrices    dr = d(Z q - F)/dp, which laws that take the balance lose from their input.
+!>   loads, matrices, sectors    dr = d(Z q - F)/dp, which laws that take the balance lose from
+!>                  their input.
 !>
 !> Where harmonic 0 is left out of the balance, or a pair has no normal dof, its derivative by the
 !> constant part of y_n is not in the balance: a twin of the law, with all harmonics and a normal
@@ -22,10 +23,10 @@ module fw_parameter_slopes
    use fw_fourier, only: fourier_type, new_fourier
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
-      is_of_matrices, is_per_pair, normal_coefficient, normal_load, normal_stiffness, &
-      parameter_group, parameter_key, reference_force, spring_coefficient, static_scale, &
-      tangential_stiffness
+   use fw_parameters, only: blade_frequency, friction_coefficient, gap, harmonic_scale, &
+      is_of_elements, is_of_matrices, is_of_sectors, is_per_pair, normal_coefficient, normal_load, &
+      normal_stiffness, parameter_group, parameter_key, reference_force, spring_coefficient, &
+      static_scale, tangential_stiffness
    use fw_recovery, only: observe
    implicit none (type, external)
    private
@@ -178,6 +179,9 @@ contains
                                parameter%element, slope)
             end if
             if (is_of_matrices(parameter%number)) call by_matrices(self, state, parameter, slope)
+            if (is_of_sectors(parameter%number)) call state%problem%structure%own_slope( &
+               state%structure_state, parameter%number - blade_frequency + 1, parameter%element, &
+               self%x, slope%residual)
          end select
          ! Laws that take the balance feel what the structure and the springs have changed.
          call answer_balance(state, slope)

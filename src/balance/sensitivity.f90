@@ -89,7 +89,8 @@ contains
          call self%slopes%prepare(state, x)
          if (allocated(self%derivative)) deallocate (self%derivative)
          allocate (self%derivative(size(self%rows), size(self%parameters)), source=0.0_wp)
-         adjoint = problem%structure%knows_field .and. size(self%rows) < size(self%parameters)
+         adjoint = (problem%structure%knows_field .or. problem%structure%pulls_observed()) .and. &
+                   size(self%rows) < size(self%parameters)
          if (self%way /= by_counts) adjoint = self%way == by_adjoint
          if (adjoint) then
             call find_adjoint(self, state, done)
@@ -276,10 +277,15 @@ contains
          allocate (slope(m, f%n_coefficients), source=0.0_wp)
          if (allocated(row%by_observed)) then
             ! Symmetric: the transpose is the condensation itself, of the conjugate.
-            allocate (field(s%whole_size(), f%n_retained), load(m, f%n_retained))
-            call s%observe_back(conjg(row%by_observed), field)
-            call s%condense_field(state%structure_state, field, load)
-            load = conjg(load)
+            allocate (load(m, f%n_retained))
+            if (s%knows_field) then
+               allocate (field(s%whole_size(), f%n_retained))
+               call s%observe_back(conjg(row%by_observed), field)
+               call s%condense_field(state%structure_state, field, load)
+               load = conjg(load)
+            else
+               call s%pull_observed(state%structure_state, row%by_observed, load)
+            end if
             call coefficients_of(f%harmonic, f%column, m, m, load, slope)
          end if
          if (allocated(row%by_force)) call pull_forces(state, row%by_force, slope)

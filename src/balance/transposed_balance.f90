@@ -13,7 +13,7 @@ module fw_transposed_balance
    use fw_force_list, only: force_entry
    use fw_kinds, only: wp
    use fw_krylov, only: linear_operator
-   use fw_lapack, only: dgemv
+   use fw_lapack, only: dgemv, zgetrs
    implicit none (type, external)
    private
 
@@ -258,6 +258,13 @@ contains
          m = state%problem%structure%n_coordinates
          allocate (amplitude(m, f%n_retained), ordered(m))
          call amplitudes_of(f%harmonic, f%column, m, vector, m, amplitude)
+         if (state%problem%structure%n_alike > 1 .and. .not. state%preconditioner%is_whole) then
+            do h = 1, f%n_retained
+               call solve_waves(state, h, amplitude(:, h))
+            end do
+            call coefficients_of(f%harmonic, f%column, m, m, amplitude, vector)
+            return
+         end if
          do h = 1, f%n_retained
             ! Built for all coordinates, in whatever order.
             ordered(state%preconditioner%place(:m)) = conjg(amplitude(:, h))
@@ -267,5 +274,60 @@ contains
          call coefficients_of(f%harmonic, f%column, m, m, amplitude, vector)
       end associate
    end subroutine precondition
+
+   !> The same with waves around equal sectors (fw_balance_waves), of symmetric Z_n: the transpose
+   !> of M_k stands in N - k, and with D symmetric that of the whole is
+   !>
+   !>   M^-T - M^-T W^T (I + Gamma D)^-T D W M^-T.
+   subroutine solve_waves(state, h, values)
+      type(balance_state), intent(inout) :: state
+      integer, intent(in) :: h
+      !> In place (n_coordinates).
+      complex(wp), intent(inout) :: values(:)
+      integer :: info, j, m, n, r
+
+      n = state%problem%structure%n_alike
+      associate (around => state%preconditioner%around, s => state%problem%structure, &
+                 own => state%preconditioner%around%own(h))
+         do j = 1, s%n_coordinates
+            around%sectors(s%slot(j), s%sector(j), h) = conjg(values(j))
+         end do
+         call solve_each_wave(state, h)
+         if (own%is_there) then
+            r = size(own%rows, 1)
+            m = n*r
+            call s%read_own(around%sectors(:, :, h), own%rows)
+            do j = 1, n
+               own%force((j - 1)*r + 1:j*r) = matmul(own%block(:, :, j), own%rows(:, j))
+            end do
+            call zgetrs('T', m, 1, own%matrix, m, own%pivot, own%force, m, info)
+            own%rows = reshape(own%force, [r, n])
+            around%answer(:, :, h) = around%sectors(:, :, h)
+            around%sectors(:, :, h) = (0.0_wp, 0.0_wp)
+            call s%add_own(own%rows, around%sectors(:, :, h))
+            call solve_each_wave(state, h)
+            around%sectors(:, :, h) = around%answer(:, :, h) - around%sectors(:, :, h)
+         end if
+         do j = 1, s%n_coordinates
+            values(j) = conjg(around%sectors(s%slot(j), s%sector(j), h))
+         end do
+      end associate
+   end subroutine solve_waves
+
+   !> M^-T of the coordinates of all sectors.
+   subroutine solve_each_wave(state, h)
+      type(balance_state), intent(inout) :: state
+      integer, intent(in) :: h
+      integer :: k, n
+
+      n = state%problem%structure%n_alike
+      associate (around => state%preconditioner%around, s => state%problem%structure)
+         call s%find_waves(around%sectors(:, :, h), around%waves(:, :, h))
+         do k = 1, n
+            call around%wave(modulo(n - k + 1, n) + 1, h)%solve_transposed(around%waves(:, k, h))
+         end do
+         call s%add_waves(around%waves(:, :, h), around%sectors(:, :, h))
+      end associate
+   end subroutine solve_each_wave
 
 end module fw_transposed_balance

@@ -107,8 +107,6 @@ contains
          asked = a /= analysis_frf
       case ("case%analysis other than 'frf' or 'point'")
          asked = all(a /= [analysis_frf, analysis_point])
-      case ("case%analysis other than 'frf', 'point', 'wear' or 'modes'")
-         asked = all(a /= [analysis_frf, analysis_point, analysis_wear, analysis_modes])
       case ("case%analysis other than 'frf', 'point', 'resonance' or 'mode'")
          asked = all(a /= [analysis_frf, analysis_point, analysis_resonance, analysis_mode])
       case (of_campbell)

@@ -6,10 +6,11 @@ module fw_parameter_values
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_forming, only: form_structure
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
-      is_of_matrices, is_per_pair, is_per_spring, loss_factor, modal_damping, normal_load, &
-      normal_stiffness, parameter_group, parameter_key, rayleigh_mass, rayleigh_stiffness, &
-      rotation_speed, static_scale, tangential_stiffness
+   use fw_parameters, only: blade_frequency, friction_coefficient, gap, harmonic_scale, &
+      is_of_elements, is_of_matrices, is_of_sectors, is_per_pair, is_per_spring, loss_factor, &
+      mistuning_scale, modal_damping, normal_load, normal_stiffness, parameter_group, &
+      parameter_key, rayleigh_mass, rayleigh_stiffness, rotation_speed, static_scale, &
+      tangential_stiffness
    implicit none (type, external)
    private
 
@@ -62,6 +63,11 @@ contains
                call parameter_key(number, key)
                values = c%constants%get(trim(key), c%n_pairs)
                return
+            else if (is_of_sectors(number)) then
+               allocate (values(0))
+               if (allocated(case%model%cyclic%deviation)) values = &
+                  case%model%cyclic%deviation%values_of(number - blade_frequency + 1)
+               return
             end if
             values = [0.0_wp]
             if (.not. allocated(case%model%changes)) return
@@ -109,6 +115,7 @@ contains
                call case%elements%set_coefficients(trim(key), values)
             end if
             if (is_of_matrices(number)) call put_of_matrices(case, number, values(1), error)
+            if (number == mistuning_scale) call m%cyclic%deviation%set_scale(values(1))
          end select
       end associate
    end subroutine put_parameter

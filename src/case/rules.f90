@@ -119,15 +119,11 @@ module fw_rules
 
    !> What waves around a cyclic structure, and the motion of all its sectors, are not solved with.
    type(rule_type), parameter :: of_sectors(*) = [ &
-      rule_type('cyclic%mistuned = .true.', &
-                "case%analysis other than 'frf', 'point', 'wear' or 'modes'", &
-                'use one of them, or leave mistuned out'), &
+      rule_type('cyclic%mistuned = .true.', of_campbell, "use 'frf' along a line of the diagram"), &
       rule_type('cyclic%mistuned = .true.', "harmonics%method other than 'hbm'", "use 'hbm'"), &
       rule_type('cyclic%mistuned = .true.', 'harmonics%accuracy', &
                 'give n_harmonics (left out, an accuracy chooses them), as many as a run of '// &
                 'the tuned wave reports'), &
-      rule_type('cyclic%mistuned = .true.', 'group &sensitivity', 'leave it out'), &
-      rule_type('cyclic%mistuned = .true.', 'sweep%parameter', 'sweep over the frequency'), &
       rule_type('cyclic%mistuned = .true.', 'group &control', 'give the load'), &
       rule_type('group &cyclic', "case%analysis = 'time'", &
                 "use 'frf' or 'point', or model all sectors"), &

@@ -71,8 +71,8 @@ contains
          if (n_found > 1) text = text//', '
          text = text//to_text(n)//' omega meets mode '//to_text(j)
          associate (cyclic => start%case%model%cyclic)
-            if (cyclic%has_sectors()) text = text//' of nodal diameter '// &
-                                         to_text(cyclic%nodal_diameter(n))
+            if (cyclic%has_sectors() .and. .not. cyclic%is_mistuned) text = text// &
+               ' of nodal diameter '//to_text(cyclic%nodal_diameter(n))
          end associate
          if (start%problem%n_pairs > 0) text = text//' with '//kind//' pairs'
          text = text//' ('//trim(short(omega(j)))//' rad/s) near the amplitude '// &

@@ -75,7 +75,7 @@ contains
       if (.not. allocated(error)) call at_rest(self, x, modes, error)
       if (.not. allocated(error)) call choose(self, modes, error)
       if (allocated(error)) return
-      if (self%case%model%cyclic%is_cyclic) then
+      if (is_wave(case)) then
          ! Waves of other nodal diameters that harmonics may meet stay as coordinates.
          self%case%sweep%start = modes%frequency()
          call at_rest(self, x, modes, error)
@@ -130,6 +130,7 @@ contains
             if (allocated(nodal%mass)) m = size(nodal%mass, 1)
          end associate
       end if
+      m = m*case%model%cyclic%n_solved()
       n = real(m, wp)
       nh = real(case%harmonics%n_harmonics + 1, wp)
       if (m > sizes%dofs_of_mode) then
@@ -144,6 +145,13 @@ contains
                           to_text(case%harmonics%n_harmonics), &
                           'reduce the model (fretwear reduce), or take fewer harmonics', error)
    end subroutine check_size
+
+   !> A wave of one nodal diameter: not all sectors together, nor a structure that is none.
+   pure logical function is_wave(case)
+      type(case_type), intent(in) :: case
+
+      is_wave = case%model%cyclic%is_cyclic .and. .not. case%model%cyclic%is_mistuned
+   end function is_wave
 
    pure logical function any_rigid(problem)
       type(balance_problem), intent(in) :: problem
@@ -261,8 +269,9 @@ contains
 
       allocate (self%met(self%problem%fourier%n_retained))
       do h = 1, size(self%met)
-         if (h > 1 .and. .not. self%case%model%cyclic%is_cyclic) then
-            self%met(h) = self%met(1)
+         ! Forces of the air act above harmonic 0 alone.
+         if (h > merge(2, 1, self%case%model%cyclic%is_cyclic) .and. .not. is_wave(self%case)) then
+            self%met(h) = self%met(h - 1)
             cycle
          end if
          allocate (self%met(h)%stuck(0), self%met(h)%sliding(0))

@@ -17,8 +17,8 @@ module fw_moved_parameter
    use fw_moved_structure, only: move_structure
    use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
    use fw_parameter_values, only: get_parameter, put_parameter
-   use fw_parameters, only: harmonic_scale, is_of_loads, is_of_matrices, is_per_element, &
-      static_scale
+   use fw_parameters, only: harmonic_scale, is_of_loads, is_of_matrices, is_of_sectors, &
+      is_per_element, static_scale
    implicit none (type, external)
    private
 
@@ -69,6 +69,7 @@ contains
          self%case%springs = case%springs
          self%case%elements = case%elements
          self%case%harmonics%filter_harmonics = case%harmonics%filter_harmonics
+         if (is_of_sectors(number)) self%case%model%cyclic%deviation = case%model%cyclic%deviation
       end if
    end function new_moved_parameter
 
@@ -109,6 +110,9 @@ contains
             call state%set_load_factors(factor(1), state%load_factor(static=.false.))
          else if (is_of_matrices(self%number)) then
             call move_structure(self%case, self%holds_eps, state, error)
+         else if (is_of_sectors(self%number)) then
+            call state%problem%structure%take_deviation(self%case%model%cyclic%deviation)
+            call state%renew_structure(error)
          else
             call renew_laws(state%problem, self%case%contact, self%case%springs, &
                             self%case%elements, self%case%harmonics%filter_harmonics)

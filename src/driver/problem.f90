@@ -237,7 +237,7 @@ contains
       if (case%model%cyclic%is_mistuned) then
          allocate (all)
          call new_all_sectors(case%model, joint%cyclic, fourier%harmonic, range, means, all, &
-                              error, joint%tuned)
+                              error, joint%tuned, keep_all=analyses(case%analysis)%is_free)
          call move_alloc(all, structure)
          return
       end if

@@ -128,21 +128,24 @@ contains
    end function most_of
 
    !> The frequencies within the range of a sweep, as comments of a namelist: of the nodal
-   !> diameters that its harmonics have.
+   !> diameters that its harmonics have, or of all sectors together.
    subroutine list_in_range(case, lines)
       type(case_type), intent(in) :: case
       type(string_type), allocatable, intent(out) :: lines(:)
       type(natural_modes) :: modes
       type(error_type), allocatable :: ignored
       character(:), allocatable :: name, text
+      character(:), allocatable :: of_what
       real(wp) :: range(2)
       integer :: j
 
       allocate (lines(0))
       if (.not. analyses(case%analysis)%has_points) return
-      if (most_of(case) > most_checked) then
-         call append(lines, "! natural frequencies: see analysis 'modes' (more than "// &
-                     to_text(most_checked)//' dofs)')
+      of_what = ''
+      if (case%model%cyclic%is_mistuned) of_what = ' of all sectors'
+      if (case%model%cyclic%n_solved()*most_of(case) > most_checked) then
+         call append(lines, '! natural frequencies'//of_what//": see analysis 'modes' (more "// &
+                     'than '//to_text(most_checked)//' dofs)')
          return
       end if
       if (analyses(case%analysis)%is_free) then
@@ -151,24 +154,44 @@ contains
          range = case%sweep%range()
          if (range(2) <= 0.0_wp) range(2) = range(1)
       end if
-      call find_natural_modes(case, min(most_listed, most_of(case)), modes, ignored, &
-                              diameters_of(case))
+      if (case%model%cyclic%is_mistuned) then
+         call find_all_sectors(case, modes, ignored)
+      else
+         call find_natural_modes(case, min(most_listed, most_of(case)), modes, ignored, &
+                                 diameters_of(case))
+      end if
       if (allocated(ignored)) return
-      text = ' within the sweep'
-      if (analyses(case%analysis)%is_free) text = ''
+      text = of_what//' within the sweep'
+      if (analyses(case%analysis)%is_free) text = of_what
       call append(lines, '! natural frequencies ['//trim(unit_words(case%sweep%unit))//']'// &
                   text//':')
       do j = 1, size(modes%nodal_diameter)
          call line_of(case, modes%open(:, j), range(1), range(2), text)
          name = ''
-         if (case%model%cyclic%has_sectors()) name = 'nodal diameter '//to_text( &
-                                                 modes%nodal_diameter(j))//' '
+         if (case%model%cyclic%has_sectors() .and. .not. case%model%cyclic%is_mistuned) name = &
+            'nodal diameter '//to_text(modes%nodal_diameter(j))//' '
          call append(lines, '!   '//name//'open'//text)
          if (case%contact%n_pairs == 0) cycle
          call line_of(case, modes%closed(:, j), range(1), range(2), text)
          call append(lines, '!   '//name//'closed'//text)
       end do
    end subroutine list_in_range
+
+   !> Those of all sectors, in place of those of a nodal diameter.
+   subroutine find_all_sectors(case, modes, error)
+      type(case_type), intent(in) :: case
+      type(natural_modes), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      type(mistuned_modes) :: all
+      integer :: n
+
+      n = case%model%cyclic%n_sectors*min(most_listed, most_of(case))
+      call find_mistuned_modes(case, n, all, error)
+      if (allocated(error)) return
+      modes%nodal_diameter = [0]
+      modes%open = reshape(all%open, [n, 1])
+      modes%closed = reshape(all%closed, [n, 1])
+   end subroutine find_all_sectors
 
    !> Nodal diameters of the harmonics, each once, without sign where waves both ways are alike.
    pure function diameters_of(case) result(list)

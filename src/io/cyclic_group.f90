@@ -39,13 +39,19 @@ contains
       logical, intent(in) :: has_points
       integer, intent(in) :: n_harmonics
       type(group_writer), intent(inout) :: to
-      integer :: h
+      integer :: h, k
 
       if (.not. cyclic%has_sectors()) return
       call to%note('/', 'n_sectors', cyclic%n_sectors)
       if (.not. has_points) return
       call to%note('/', 'engine_order', cyclic%engine_order)
-      if (cyclic%is_mistuned) call to%note('/', 'mistuned', 1)
+      if (cyclic%is_mistuned) then
+         call to%note('/', 'mistuned', 1)
+         associate (n => cyclic%n_sectors)
+            call to%put('/blades/nodal_diameter', [(k - 1 - (n - 1)/2, k=1, n)], '', 'wave', &
+                        'signed nodal diameter of each wave')
+         end associate
+      end if
       call to%put('/cyclic/nodal_diameter', [(cyclic%nodal_diameter(h), h=0, n_harmonics)], '', &
                   'harmonic', 'signed nodal diameter of each harmonic')
    end subroutine write_cyclic

@@ -59,10 +59,11 @@ module fw_hdf5_append
       procedure :: permute
       procedure :: close
       !> `call dataset%append(file, values, error)`: one row, of exactly the shape created.
-      generic :: append => append_real, append_integer, append_logical
-      procedure, private :: append_real, append_integer, append_logical
-      !> One row of reals whose elements follow one another.
-      procedure :: append_flat
+      generic :: append => append_real, append_logical
+      procedure, private :: append_real, append_logical
+      !> One row of numbers whose elements follow one another.
+      generic :: append_flat => append_flat_real, append_flat_integer
+      procedure, private :: append_flat_real, append_flat_integer
       !> `call dataset%drain(file, error)`: write what waits.
       procedure :: drain
       procedure, private :: append_raw
@@ -300,7 +301,7 @@ contains
    end subroutine append_real
 
    !> A row of any shape, its elements in their order in memory: h5py shows the dimensions reversed.
-   subroutine append_flat(self, file, dims, values, error)
+   subroutine append_flat_real(self, file, dims, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       !> Shape of the row.
@@ -310,20 +311,19 @@ contains
 
       call self%append_raw(file, dims, bytes_of(c_loc(values), &
                                                   storage_size(values)/8*size(values)), error)
-   end subroutine append_flat
+   end subroutine append_flat_real
 
-   !> One whole number a row.
-   subroutine append_integer(self, file, values, error)
+   !> The same of whole numbers; one without a dimension.
+   subroutine append_flat_integer(self, file, dims, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
-      integer, intent(in) :: values
+      integer, intent(in) :: dims(:)
+      integer, intent(in), target :: values(product(dims))
       type(error_type), allocatable, intent(out) :: error
-      integer, target :: buffer
 
-      buffer = values
-      call self%append_raw(file, [integer ::], bytes_of(c_loc(buffer), &
-                                                            storage_size(buffer)/8), error)
-   end subroutine append_integer
+      call self%append_raw(file, dims, bytes_of(c_loc(values), &
+                                                storage_size(values)/8*size(values)), error)
+   end subroutine append_flat_integer
 
    !> One truth value a row, a byte in the file.
    subroutine append_logical(self, file, values, error)

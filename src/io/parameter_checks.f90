@@ -3,6 +3,7 @@
 module fw_parameter_checks
    use fw_case, only: case_type
    use fw_contact_data, only: contact_type
+   use fw_deviation, only: deviation_type, of_frequency
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    use fw_law_text, only: law_text
@@ -12,18 +13,20 @@ module fw_parameter_checks
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
-      is_of_matrices, is_per_pair, is_per_spring, mu_dynamic, normal_coefficient, normal_load, &
-      normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, parameter_group, &
-      parameter_key, parameter_words, parameters, positive, reference_force, rotation_speed, &
-      static_scale, tangential_stiffness
+      is_of_matrices, is_of_sectors, is_per_pair, is_per_spring, mistuning_scale, mu_dynamic, &
+      normal_coefficient, normal_load, normal_stiffness, not_negative, of_closing, of_pressed, &
+      of_sliding, parameter_group, parameter_key, parameter_words, parameters, positive, &
+      reference_force, rotation_speed, static_scale, tangential_stiffness
+   use fw_read_mistuning, only: negative_mass
    use fw_solver_options, only: continuation_natural
+   use fw_text, only: to_text
    use fw_values, only: number_text
    implicit none (type, external)
    private
 
-   public :: check_parameter, check_parameter_sweep, pairs_of
+   public :: check_parameter, check_parameter_sweep, check_scales, pairs_of
 
-   character(*), parameter :: swept = 'sweep%parameter'
+   character(*), parameter :: swept = 'sweep%parameter', derived = 'sensitivity%parameters'
 
 contains
 
@@ -49,6 +52,8 @@ contains
             'give group &'//trim(group)
       else if (is_of_matrices(number)) then
          call check_of_matrices(case, number, reason)
+      else if (is_of_sectors(number)) then
+         call check_of_sectors(case, number, asked_by, reason)
       else
          call check_of_loads(case%model, number, reason)
       end if
@@ -151,6 +156,57 @@ contains
       end if
    end subroutine check_of_matrices
 
+   !> What no sector differs by, and what goes from blade to blade.
+   subroutine check_of_sectors(case, number, asked_by, reason)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: number
+      character(*), intent(in) :: asked_by
+      character(:), allocatable, intent(out) :: reason
+      real(wp), allocatable :: values(:)
+      character(24) :: key
+
+      call get_parameter(case, number, values)
+      call parameter_key(number, key)
+      if (.not. allocated(case%model%cyclic%deviation)) then
+         reason = 'no sector differs: give &cyclic mistuned = .true. and group &mistuning '// &
+                  '(values of 0 serve)'
+      else if (size(values) == 0) then
+         reason = 'mistuning%'//trim(key)//' is not given (values of 0 serve)'
+      else if (number /= mistuning_scale .and. asked_by /= derived) then
+         reason = "values go from blade to blade: use 'mistuning%scale'"
+      end if
+   end subroutine check_of_sectors
+
+   !> Scales at which a blade has no frequency, or a sector no mass.
+   subroutine check_scales(case, ends, asked_by, error)
+      type(case_type), intent(in) :: case
+      !> Lowest and highest scale.
+      real(wp), intent(in) :: ends(2)
+      character(*), intent(in) :: asked_by
+      type(error_type), allocatable, intent(out) :: error
+      type(deviation_type) :: deviation
+      integer :: j, k
+
+      deviation = case%model%cyclic%deviation
+      do k = 1, 2
+         if (any(1.0_wp + ends(k)*deviation%values_of(of_frequency) <= 0.0_wp)) then
+            call fatal_error(error, asked_by//" = 'mistuning%scale' comes to "// &
+                             number_text(ends(k))//', where 1 + scale*frequency of a blade is '// &
+                             'not above 0: must stay where it is', status_input)
+            return
+         end if
+         if (.not. allocated(case%model%mass)) cycle
+         call deviation%set_scale(ends(k))
+         j = negative_mass(case%model%mass, deviation)
+         if (j < 0) cycle
+         call fatal_error(error, asked_by//" = 'mistuning%scale' comes to "// &
+                          number_text(ends(k))//', where the mass matrix of sector '// &
+                          to_text(j)//' is not positive: must leave mass to every motion', &
+                          status_input)
+         return
+      end do
+   end subroutine check_scales
+
    !> Pairs that a parameter says something of.
    function pairs_of(contact, number) result(counts)
       type(contact_type), intent(in) :: contact
@@ -230,6 +286,8 @@ contains
          case (positive); if (.not. lowest > 0.0_wp) call refuse_lowest('above 0')
          case default ! any
          end select
+         if (over%number == mistuning_scale) call check_scales( &
+            case, over%ends()*merge(base(1), 1.0_wp, over%as == as_factor), swept, error)
       end associate
 
    contains

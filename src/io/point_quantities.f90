@@ -10,14 +10,14 @@ module fw_point_quantities
    use fw_elements, only: element_kind
    use fw_hdf5, only: growing_integer, growing_logical, growing_real
    use fw_kinds, only: wp
-   use fw_parameters, only: is_of_elements, is_per_pair, is_per_spring, n_parameter_words, &
-      parameter_dataset, parameter_group, parameter_words
+   use fw_parameters, only: is_of_elements, is_of_sectors, is_per_element, is_per_pair, &
+      is_per_spring, n_parameter_words, parameter_dataset, parameter_group, parameter_words
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_quantity_conditions, only: always, asks_stability, changes_friction, follows_branch, &
       follows_frequency, follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, &
       has_levels, has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, &
-      is_mode, is_response, moves_base, scales_load, shows_contact, shows_user, wears
+      is_mistuned, is_mode, is_response, moves_base, scales_load, shows_contact, shows_user, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -93,6 +93,12 @@ contains
                'Fourier coefficients 0, c1, s1, ... of observed quantities', always)
       call add('amplitude', r, '<length>', 'point observed', 'largest magnitude over the period', &
                always)
+      call add('blades/largest', r, '<length>', 'point quantity', &
+               'largest amplitude of all sectors', is_mistuned)
+      call add('blades/sector', i, '', 'point quantity', 'sector that has it, from 0', is_mistuned)
+      list(n)%missing = -1
+      call add('blades/content', r, '<length>', 'point quantity wave', &
+               'amplitudes of the nodal diameters in the first harmonic', is_mistuned)
       call add('converged', l, '', 'point', 'whether the point converged', always)
       call add('iterations', i, '1', 'point', 'iterations of the solver', always)
       call add('residual', r, '1', 'point', 'residual over vibratory load', always)
@@ -212,6 +218,7 @@ contains
          dimension = ''
          if (is_per_pair(parameter)) dimension = ' pair'
          if (is_per_spring(parameter)) dimension = ' spring'
+         if (is_of_sectors(parameter) .and. is_per_element(parameter)) dimension = ' value'
          if (.not. is_of_elements(parameter)) return
          call parameter_group(parameter, dimension)
          dimension = ' '//dimension(:23)
@@ -268,6 +275,10 @@ contains
       select case (dimension)
       case ('observed')
          n = case%model%n_observed()
+      case ('quantity')
+         n = case%model%n_observed()/case%model%cyclic%n_solved()
+      case ('wave')
+         n = case%model%cyclic%n_sectors
       case ('coefficient')
          n = 2*max(case%harmonics%n_harmonics, case%output%tail) + 1
       case ('pair')
@@ -311,6 +322,8 @@ contains
 
       if (any(self%sensitivity /= 0)) then
          call find_sensitivity(point, self%sensitivity, carried)
+      else if (index(self%name, 'blades/') == 1) then
+         call blades_of(point, trim(self%name), case%model%cyclic%n_sectors, carried)
       else
          call values_of(point, self%name, carried)
       end if
@@ -327,6 +340,42 @@ contains
       allocate (values(n), source=0.0_wp)
       values(:size(carried)) = carried
    end subroutine row
+
+   !> What sectors do beside each other: the largest amplitude, the sector that has it, and of the
+   !> first harmonics U_j = c - i s the waves abs(sum exp(2 pi i j k/N) U_j)/N of the signed nodal
+   !> diameters k, from above -N/2 up to N/2.
+   pure subroutine blades_of(point, name, n_sectors, values)
+      type(point_type), intent(in) :: point
+      character(*), intent(in) :: name
+      integer, intent(in) :: n_sectors
+      real(wp), allocatable, intent(out) :: values(:)
+      complex(wp) :: turn(0:n_sectors - 1), wave
+      integer :: i, j, k, n
+      real(wp), parameter :: full = 8.0_wp*atan(1.0_wp)
+
+      if (.not. (allocated(point%amplitude) .and. allocated(point%coefficients))) return
+      n = size(point%amplitude)/n_sectors
+      select case (name)
+      case ('blades/largest')
+         values = [(maxval(point%amplitude(i::n)), i=1, n)]
+      case ('blades/sector')
+         values = [(real(maxloc(point%amplitude(i::n), dim=1) - 1, wp), i=1, n)]
+      case default
+         if (size(point%coefficients, 1) < 3) return
+         turn = [(exp(cmplx(0.0_wp, full*j/n_sectors, wp)), j=0, n_sectors - 1)]
+         allocate (values(n*n_sectors))
+         do i = 1, n
+            do k = 1, n_sectors
+               wave = (0.0_wp, 0.0_wp)
+               do j = 0, n_sectors - 1
+                  wave = wave + turn(modulo(j*(k - 1 - (n_sectors - 1)/2), n_sectors))* &
+                         cmplx(point%coefficients(2, j*n + i), -point%coefficients(3, j*n + i), wp)
+               end do
+               values((i - 1)*n_sectors + k) = abs(wave)/n_sectors
+            end do
+         end do
+      end select
+   end subroutine blades_of
 
    !> Whether the result of a case has the quantity.
    pure logical function is_there(self, case)

@@ -11,7 +11,8 @@ module fw_quantity_conditions
    public :: always, asks_stability, changes_friction, follows_branch, follows_frequency, &
              follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, has_levels, &
              has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, &
-             is_mode, is_response, moves_base, scales_load, shows_contact, shows_user, wears
+             is_mistuned, is_mode, is_response, moves_base, scales_load, shows_contact, &
+             shows_user, wears
 
 contains
 
@@ -21,6 +22,13 @@ contains
 
       has_stress = case%stress%is_wanted()
    end function has_stress
+
+   !> All sectors of a disk, which may differ.
+   pure logical function is_mistuned(case)
+      type(case_type), intent(in) :: case
+
+      is_mistuned = case%model%cyclic%has_sectors() .and. case%model%cyclic%is_mistuned
+   end function is_mistuned
 
    !> Their components too.
    pure logical function has_tensor(case)

@@ -13,7 +13,7 @@ module fw_read_case
    use fw_model_keys, only: model_options
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: is_of_matrices
+   use fw_parameters, only: is_of_matrices, is_of_sectors
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_elements, only: read_contact, read_elements, read_springs, user_element
    use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
@@ -30,7 +30,7 @@ module fw_read_case
    use fw_records, only: record_list
    use fw_resonance_options, only: resonance_as_factor => as_factor
    use fw_solver_options, only: continuation_natural
-   use fw_text, only: string_type, to_text
+   use fw_text, only: lower_case, string_type, to_text
    use fw_text_list, only: append
    use fw_unit_values, only: convert_units, has_units, needs_system
    use fw_values, only: number_text, quoted_text
@@ -400,6 +400,16 @@ contains
       if (stat /= 0 .or. .not. (order > 0.0_wp .and. order <= huge(1.0_wp))) order = 0.0_wp
    end function speed_order_of
 
+   !> Whether derivatives are taken by what sectors have beside each other, or it moves: asked
+   !> before the sweep is read.
+   logical function moves_sectors(reader, case) result(moves)
+      type(reader_type), intent(in) :: reader
+      type(case_type), intent(in) :: case
+
+      moves = any(is_of_sectors(case%sensitivity%parameters)) .or. is_of_sectors(case%varied) .or. &
+              index(lower_case(reader%text_of('sweep', 'parameter')), 'mistuning') > 0
+   end function moves_sectors
+
    !> The model with its contact, springs and loads.
    subroutine read_structure(reader, path, case, raw, error, memory_model, laws)
       type(reader_type), intent(inout) :: reader
@@ -421,7 +431,7 @@ contains
       call read_cyclic(reader, raw%cyclic, n_dof, analyses(case%analysis)%has_points, &
                        case%model%cyclic)
       if (.not. allocated(raw%mistuning)) allocate (raw%mistuning)
-      call read_mistuning(reader, raw, case%model%cyclic)
+      call read_mistuning(reader, raw, moves_sectors(reader, case), case%model%cyclic)
       options%speed_order = speed_order_of(reader)
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &

@@ -8,7 +8,8 @@
 !>   dM_j = s m_j M_b + s dM_j,   dC_j = W^T diag(2 w s z_j) W + s dC_j.
 module fw_read_mistuning
    use fw_cyclic_data, only: cyclic_type
-   use fw_deviation, only: damping_part, deviation_type, mass_part, stiffness_part
+   use fw_deviation, only: damping_part, deviation_type, mass_part, of_damping, of_frequency, &
+      of_mass, of_sector, of_stiffness, stiffness_part
    use fw_key, only: key, key_visitor
    use fw_key_range, only: above, from_to
    use fw_kinds, only: wp
@@ -21,7 +22,7 @@ module fw_read_mistuning
    implicit none (type, external)
    private
 
-   public :: read_mistuning
+   public :: read_mistuning, negative_mass
 
    !> More rows are taken for a mistake.
    integer, parameter :: most_rows = 100000
@@ -91,10 +92,12 @@ contains
    end function asks_for_sectors
 
    !> What sectors have beside each other; nothing where that is nothing.
-   subroutine read_mistuning(reader, raw, cyclic)
+   subroutine read_mistuning(reader, raw, keeps, cyclic)
       type(reader_type), intent(inout) :: reader
       !> The model as it was given; takes what the group says.
       type(raw_model), intent(inout) :: raw
+      !> Deviations of 0 too: derivatives are taken by them, or their scale moves.
+      logical, intent(in) :: keeps
       !> Takes the deviation of the matrices.
       type(cyclic_type), intent(inout) :: cyclic
       type(mistuning_options) :: options
@@ -116,8 +119,8 @@ contains
       end if
       if (.not. raw%mistuning%deviates()) return
       call check_parts(reader, options%scale, raw, cyclic%n_sectors)
-      if (reader%failed() .or. abs(options%scale) <= 0.0_wp) return
-      call form_deviation(options%scale, raw, cyclic)
+      if (reader%failed() .or. (abs(options%scale) <= 0.0_wp .and. .not. keeps)) return
+      call form_deviation(options%scale, raw, keeps, cyclic)
       call check_masses(reader, raw, cyclic)
    end subroutine read_mistuning
 
@@ -314,11 +317,13 @@ contains
    end subroutine check_sector
 
    !> Rows that all sectors share, then the matrices of each on them.
-   subroutine form_deviation(scale, raw, cyclic)
+   subroutine form_deviation(scale, raw, keeps, cyclic)
       !> Of all deviations.
       real(wp), intent(in) :: scale
       !> With parts that fit each other.
       type(raw_model), intent(inout) :: raw
+      !> Whether it is kept where it is 0.
+      logical, intent(in) :: keeps
       !> Its deviation is formed here.
       type(cyclic_type), intent(inout) :: cyclic
       type(deviation_type) :: deviation
@@ -340,28 +345,21 @@ contains
             end do
          end if
          call deviation%settle(cyclic%n_sectors)
-         do j = 0, cyclic%n_sectors - 1
-            if (allocated(parts%frequency)) call deviation%add_to( &
-               stiffness_part, j, parts%rows, parts%row_omega**2* &
-               (scale*parts%frequency(:, j + 1)*(2.0_wp + scale*parts%frequency(:, j + 1))))
-            if (allocated(parts%damping_ratio)) call deviation%add_to( &
-               damping_part, j, parts%rows, 2.0_wp*scale*parts%row_omega* &
-               parts%damping_ratio(:, j + 1))
-            if (allocated(parts%stiffness)) call deviation%add_to( &
-               stiffness_part, j, matrix=scale*parts%stiffness(j + 1)*parts%blade_stiffness)
-            if (allocated(parts%mass)) call deviation%add_to( &
-               mass_part, j, matrix=scale*parts%mass(j + 1)*parts%blade_mass)
-            if (.not. allocated(parts%sector)) cycle
-            associate (own => parts%sector(j + 1))
-               if (allocated(own%stiffness)) call deviation%add_to(stiffness_part, j, &
-                                                                   matrix=scale*own%stiffness)
-               if (allocated(own%mass)) call deviation%add_to(mass_part, j, matrix=scale*own%mass)
-               if (allocated(own%damping)) call deviation%add_to(damping_part, j, &
-                                                                 matrix=scale*own%damping)
-            end associate
-         end do
+         call add_values(of_frequency, stiffness_part, parts%frequency)
+         call add_values(of_damping, damping_part, parts%damping_ratio)
+         call add_blades(of_stiffness, stiffness_part, parts%stiffness, parts%blade_stiffness)
+         call add_blades(of_mass, mass_part, parts%mass, parts%blade_mass)
+         if (allocated(parts%sector)) then
+            do j = 1, size(parts%sector)
+               call add_sector(stiffness_part, parts%sector(j)%stiffness)
+               call add_sector(mass_part, parts%sector(j)%mass)
+               call add_sector(damping_part, parts%sector(j)%damping)
+            end do
+         end if
       end associate
-      if (all(abs(deviation%part) <= 0.0_wp)) return
+      call deviation%set_scale(scale)
+      if (size(deviation%rows, 1) == 0) return
+      if (all(abs(deviation%part) <= 0.0_wp) .and. .not. keeps) return
       cyclic%deviation = deviation
 
    contains
@@ -372,6 +370,51 @@ contains
 
          if (allocated(matrix)) call deviation%add_range(matrix, tuned)
       end subroutine add_own
+
+      !> On the rows of blade modes.
+      subroutine add_values(of, part, values)
+         integer, intent(in) :: of, part
+         !> (n_rows, n_sectors)
+         real(wp), allocatable, intent(in) :: values(:, :)
+         integer :: a, sector
+
+         if (.not. allocated(values)) return
+         associate (parts => raw%mistuning)
+            do sector = 1, size(values, 2)
+               do a = 1, size(values, 1)
+                  call deviation%add(of, part, sector - 1, values(a, sector), &
+                                     merge(parts%row_omega(a)**2, 2.0_wp*parts%row_omega(a), &
+                                           part == stiffness_part), row=parts%rows(a, :))
+               end do
+            end do
+         end associate
+      end subroutine add_values
+
+      !> With a matrix that all blades share.
+      subroutine add_blades(of, part, values, matrix)
+         integer, intent(in) :: of, part
+         !> (n_sectors)
+         real(wp), allocatable, intent(in) :: values(:), matrix(:, :)
+         real(wp), allocatable :: on_rows(:, :)
+         integer :: sector
+
+         if (.not. allocated(values)) return
+         call deviation%bring_to_rows(matrix, on_rows)
+         do sector = 1, size(values)
+            call deviation%add(of, part, sector - 1, values(sector), 1.0_wp, matrix=on_rows)
+         end do
+      end subroutine add_blades
+
+      !> The matrix of sector j.
+      subroutine add_sector(part, matrix)
+         integer, intent(in) :: part
+         real(wp), allocatable, intent(in) :: matrix(:, :)
+         real(wp), allocatable :: on_rows(:, :)
+
+         if (.not. allocated(matrix)) return
+         call deviation%bring_to_rows(matrix, on_rows)
+         call deviation%add(of_sector, part, j - 1, 1.0_wp, 1.0_wp, matrix=on_rows)
+      end subroutine add_sector
 
    end subroutine form_deviation
 
@@ -408,23 +451,36 @@ contains
       !> With the deviation.
       type(cyclic_type), intent(in) :: cyclic
       integer :: j
-      real(wp) :: limit
 
       if (.not. allocated(cyclic%deviation) .or. .not. allocated(raw%mass)) return
-      associate (d => cyclic%deviation)
+      j = negative_mass(raw%mass, cyclic%deviation)
+      if (j >= 0) call reader%refuse('mistuning', 'mass', 'of sector '//to_text(j)//' makes '// &
+                                     'its mass matrix one that is not positive: must leave '// &
+                                     'mass to every motion')
+   end subroutine check_masses
+
+   !> The first sector, from 0, whose mass is negative in some motion although that of the tuned one
+   !> is not; -1 where there is none.
+   integer function negative_mass(mass, deviation) result(sector)
+      !> Of the tuned sector (n, n).
+      real(wp), intent(in) :: mass(:, :)
+      type(deviation_type), intent(in) :: deviation
+      real(wp) :: limit
+      integer :: j
+
+      sector = -1
+      associate (d => deviation)
          if (all(abs(d%part(:, :, :, mass_part)) <= 0.0_wp)) return
-         limit = -round_off*size_of(raw%mass)
-         if (lowest(raw%mass) < limit) return
-         do j = 1, cyclic%n_sectors
-            if (lowest(raw%mass + matmul(transpose(d%rows), matmul(d%part(:, :, j, mass_part), &
-                                                                   d%rows))) >= limit) cycle
-            call reader%refuse('mistuning', 'mass', 'of sector '//to_text(j - 1)//' makes its '// &
-                               'mass matrix one that is not positive: must leave mass to every '// &
-                               'motion')
+         limit = -round_off*sqrt(maxval(sum(mass**2, dim=1)))
+         if (lowest(mass) < limit) return
+         do j = 1, size(d%part, 3)
+            if (lowest(mass + matmul(transpose(d%rows), matmul(d%part(:, :, j, mass_part), &
+                                                               d%rows))) >= limit) cycle
+            sector = j - 1
             return
          end do
       end associate
-   end subroutine check_masses
+   end function negative_mass
 
    !> Lowest eigenvalue.
    real(wp) function lowest(matrix)

@@ -3,9 +3,10 @@ module fw_read_resonance
    use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
-   use fw_parameter_checks, only: check_parameter
+   use fw_parameter_checks, only: check_parameter, check_scales
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: is_of_loads, not_negative, parameter_words, parameters, positive
+   use fw_parameters, only: is_of_loads, mistuning_scale, not_negative, parameter_words, &
+      parameters, positive
    use fw_reader, only: reader_type
    use fw_resonance_options, only: as_factor, condition_phase, resonance_options, spacing_log
    use fw_solver_options, only: continuation_arclength
@@ -97,6 +98,12 @@ contains
       if (allocated(error)) return
       call get_parameter(case, case%resonance%parameter, values)
       name = parameter_words(case%resonance%parameter)
+      if (case%resonance%parameter == mistuning_scale) then
+         call check_scales(case, [case%resonance%start, case%resonance%end]* &
+                           merge(values(1), 1.0_wp, case%resonance%as == as_factor), &
+                           'resonance%parameter', error)
+         if (allocated(error)) return
+      end if
       if (case%resonance%as == as_factor) then
          if (any(abs(values) > 0.0_wp)) return
          call fatal_error(error, "resonance%as = 'factor': "//trim(name)//' is 0 in the case, '// &

@@ -1,13 +1,16 @@
 !> Group &sensitivity: which derivatives are wanted, and whether the case has them.
 module fw_read_sensitivity
    use fw_case, only: analyses, case_type
+   use fw_deviation, only: mass_part
    use fw_error, only: error_type, fatal_error, status_input
    use fw_key, only: key
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
+   use fw_mode_options, only: control_observed
    use fw_parameter_checks, only: check_parameter, pairs_of
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient, harmonic_scale, normal_load, parameter_words
+   use fw_parameters, only: blade_frequency, friction_coefficient, harmonic_scale, is_of_sectors, &
+      normal_load, parameter_words
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
    use fw_response_rows, only: dissipation, first_harmonic, is_of_pairs, largest, load_scale, &
@@ -148,6 +151,7 @@ contains
                              'derivatives are those of load_scale)', status_input)
          end if
          if (.not. allocated(error)) call check_onset(case, case%sensitivity%parameters(k), error)
+         if (.not. allocated(error)) call check_mass(case, case%sensitivity%parameters(k), error)
          if (allocated(error)) return
       end do
       call check_quantities(case, error)
@@ -157,6 +161,24 @@ contains
       call fatal_error(error, '&harmonics n_harmonics is missing: derivatives (&sensitivity) '// &
                        'are those of a balance of given harmonics', status_input)
    end subroutine check_sensitivity
+
+   !> The modal amplitude is measured by a mass that is to stay.
+   subroutine check_mass(case, parameter, error)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: parameter
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: part(:, :, :, :)
+
+      if (.not. (analyses(case%analysis)%is_free .and. is_of_sectors(parameter))) return
+      if (case%mode%control == control_observed) return
+      associate (deviation => case%model%cyclic%deviation)
+         allocate (part, mold=deviation%part)
+         call deviation%change(parameter - blade_frequency + 1, 1, part)
+      end associate
+      if (any(abs(part(:, :, :, mass_part)) > 0.0_wp)) call fatal_error( &
+         error, "sensitivity%parameters = '"//trim(parameter_words(parameter))//"' changes the "// &
+         "mass, by which mode%control = 'modal' measures amplitudes: use 'observed'", status_input)
+   end subroutine check_mass
 
    !> Friction begins at mu = 0 and at a load of 0: derivatives there are one-sided.
    subroutine check_onset(case, parameter, error)

@@ -295,7 +295,9 @@ contains
          if (index(self%quantity%dimensions, 'step') == 1) return
          ! Integers have no NaN: each says by itself what stands for unknown.
          if (self%quantity%kind_of == growing_integer) then
-            call self%dataset%append(file, self%quantity%missing, error)
+            call self%dataset%append_flat(file, self%row_shape, &
+                                          spread(self%quantity%missing, 1, &
+                                                 product(self%row_shape)), error)
          else
             call self%dataset%skip(file, 1, error)
          end if
@@ -303,7 +305,7 @@ contains
       end if
       select case (self%quantity%kind_of)
       case (growing_integer)
-         call self%dataset%append(file, nint(values(1)), error)
+         call self%dataset%append_flat(file, self%row_shape, nint(values), error)
       case (growing_logical)
          call self%dataset%append(file, values(1) > 0.0_wp, error)
       case default

@@ -12,6 +12,7 @@ module fw_all_sectors
    use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_cyclic_data, only: cyclic_type
    use fw_cyclic_relative, only: cyclic_relative
+   use fw_deviation, only: deviation_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    use fw_lapack, only: zgemv
@@ -71,6 +72,10 @@ module fw_all_sectors
       procedure :: own_block
       procedure :: read_own
       procedure :: add_own
+      procedure :: own_slope
+      procedure :: take_deviation
+      procedure :: pulls_observed
+      procedure :: pull_observed
    end type all_sectors
 
    type, extends(structure_state) :: all_sectors_state
@@ -83,17 +88,23 @@ module fw_all_sectors
       !> What sectors have beside their mean (n_own, n_own, n_sectors, n_retained), and the rows
       !> that it acts on (n_own, n_sectors, n_retained).
       complex(wp), allocatable, private :: own(:, :, :, :), rows(:, :, :)
+      !> Observed quantities of a sector by its waves, of a frequency (n_observed of a sector,
+      !> n_slots, n_sectors, n_retained).
+      complex(wp), allocatable, private :: observe(:, :, :, :)
+      real(wp), private :: observe_at = -1.0_wp
    end type all_sectors_state
 
    ! Its bases (fw_all_sectors_setup).
    interface
       !> Bases of all nodal diameters, and transforms between sectors and waves.
       module subroutine new_all_sectors(model, relative, harmonic, omega_range, means, self, &
-                                        error, tuned)
+                                        error, tuned, keep_all)
          type(model_type), intent(in) :: model
          type(cyclic_relative), intent(in) :: relative
          !> The same without the rows in which sectors differ.
          type(cyclic_relative), intent(in), optional :: tuned
+         !> Condense nothing, for a nonlinear mode.
+         logical, intent(in), optional :: keep_all
          !> Harmonics in use.
          integer, intent(in) :: harmonic(:)
          !> Lowest and highest frequency that will be asked for [rad/s].
@@ -145,6 +156,14 @@ module fw_all_sectors
          complex(wp), intent(in), contiguous :: q(:, :)
          complex(wp), intent(out), contiguous :: observed(:, :)
       end subroutine recover
+
+      !> Back from what is observed, wave by wave.
+      module subroutine pull_observed(self, state, observed, slope)
+         class(all_sectors), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         complex(wp), intent(in) :: observed(:, :)
+         complex(wp), intent(out) :: slope(:, :)
+      end subroutine pull_observed
 
       !> Derivative of what is observed by the frequency, wave by wave.
       module subroutine observed_slope(self, state, q, slope)
@@ -528,6 +547,56 @@ contains
 
       if (allocated(self%deviation)) call self%deviation%add_rows(rows, sectors)
    end subroutine add_own
+
+   !> The rows of all sectors in every harmonic, through the changed matrices.
+   subroutine own_slope(self, state, of, number, q, slope)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: of, number
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: slope(*)
+      complex(wp), allocatable :: amplitude(:, :), sectors(:, :), rows(:, :), own(:, :, :)
+      integer :: h, j, m
+
+      m = self%n_coordinates
+      allocate (amplitude(m, size(self%harmonic)), sectors(self%n_slots, self%n_alike))
+      allocate (rows(self%n_own(), self%n_alike), own(self%n_own(), self%n_own(), self%n_alike))
+      call amplitudes_of(self%harmonic, self%column, m, q, m, amplitude)
+      select type (state)
+      type is (all_sectors_state)
+         do h = 1, size(self%harmonic)
+            do j = 1, self%n_alike
+               sectors(:, j) = amplitude(self%coordinate(:, j), h)
+            end do
+            amplitude(:, h) = zero
+            if (.not. allocated(self%deviation)) cycle
+            call self%deviation%read_rows(sectors, rows)
+            call self%deviation%form_change(of, number, state%point(1, h)%theta, &
+                                            state%point(1, h)%s, own)
+            sectors = zero
+            call self%deviation%add_rows(rows, sectors, own)
+            do j = 1, self%n_alike
+               amplitude(self%coordinate(:, j), h) = sectors(:, j)
+            end do
+         end do
+      end select
+      call coefficients_of(self%harmonic, self%column, m, m, amplitude, slope)
+   end subroutine own_slope
+
+   !> Nothing tells the two directions apart.
+   pure logical function pulls_observed(self)
+      class(all_sectors), intent(in) :: self
+      integer :: k
+
+      pulls_observed = .not. any([(self%basis(k)%has_whirl(), k=1, size(self%basis))])
+   end function pulls_observed
+
+   pure subroutine take_deviation(self, deviation)
+      class(all_sectors), intent(inout) :: self
+      type(deviation_type), intent(in) :: deviation
+
+      if (allocated(self%deviation)) self%deviation%of = deviation
+   end subroutine take_deviation
 
    pure real(wp) function static_stiffness(self, coordinate)
       class(all_sectors), intent(in) :: self

@@ -8,13 +8,17 @@ submodule(fw_all_sectors) fw_all_sectors_setup
 contains
 
    module procedure new_all_sectors
+      logical :: keeps_all
+
+      keeps_all = .false.
+      if (present(keep_all)) keeps_all = keep_all
       call lay_out_coefficients(self, harmonic)
       self%cyclic%n_sectors = model%cyclic%n_sectors
       self%cyclic%engine_order = model%cyclic%engine_order
       self%n_alike = self%cyclic%n_sectors
       self%n_relative = self%n_alike*relative%n_coordinates
       self%n_observed = self%n_alike*size(model%observe_matrix, 1)
-      call find_bases(model, relative, omega_range, self, error)
+      call find_bases(model, relative, omega_range, keeps_all, self, error)
       if (allocated(error)) return
       call find_norms(self)
       if (present(tuned)) then
@@ -49,10 +53,11 @@ contains
    end subroutine find_norms
 
    !> A basis for each nodal diameter, with coordinates at places that all share.
-   subroutine find_bases(model, relative, omega_range, self, error)
+   subroutine find_bases(model, relative, omega_range, keeps_all, self, error)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       real(wp), intent(in) :: omega_range(2)
+      logical, intent(in) :: keeps_all
       type(all_sectors), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices), allocatable :: nodal(:)
@@ -74,7 +79,7 @@ contains
                'holds; hold it or remove the load', status_input)
          end if
          if (allocated(error)) return
-         if (allocated(nodal(k + 1)%circulatory)) then
+         if (allocated(nodal(k + 1)%circulatory) .or. keeps_all) then
             call self%basis(k + 1)%keep_all()
          else
             call self%basis(k + 1)%keep_resonances(self%harmonic, omega_range, &

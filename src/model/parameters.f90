@@ -7,12 +7,12 @@ module fw_parameters
 
    public :: parameter_type, parameters, parameter_words, n_parameter_words, parameter_number, &
              parameter_group, parameter_key, parameter_dataset
-   public :: is_of_elements, is_of_loads, is_of_matrices, is_per_element, is_per_pair, &
-             is_per_spring
+   public :: is_of_elements, is_of_loads, is_of_matrices, is_of_sectors, is_per_element, &
+             is_per_pair, is_per_spring
    public :: harmonic_scale, static_scale, friction_coefficient, normal_load, gap, &
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
              rotation_speed, rayleigh_mass, rayleigh_stiffness, normal_coefficient, &
-             reference_force, loss_factor, slip_speed, mu_dynamic
+             reference_force, loss_factor, slip_speed, mu_dynamic, blade_frequency, mistuning_scale
    public :: of_sliding, of_closing, of_pressed, not_negative, positive
 
    integer, parameter :: harmonic_scale = 1, static_scale = 2, friction_coefficient = 3, &
@@ -21,11 +21,14 @@ module fw_parameters
                          rotation_speed = 10, rayleigh_mass = 11, rayleigh_stiffness = 12, &
                          normal_coefficient = 13, reference_force = 14, loss_factor = 17, &
                          slip_speed = 18, mu_dynamic = 19
+   !> The first and the last of those in which sectors differ, in the order of fw_deviation.
+   integer, parameter :: blade_frequency = 20, mistuning_scale = 24
 
    !> Where its values are: one of the loads, one for each pair or spring, one of the matrices, one
-   !> for each of a group of other elements (its coefficient).
+   !> for each of a group of other elements (its coefficient), one for each sector or for each row
+   !> of each of them.
    integer, parameter :: of_loads = 1, of_pairs = 2, of_springs = 3, of_matrices = 4, &
-                         of_elements = 5
+                         of_elements = 5, of_sectors = 6
    !> Pairs that it says something of: those with tangential dofs, with a normal dof, or those that
    !> a constant load presses, as they have no normal dof.
    integer, parameter :: of_sliding = 1, of_closing = 2, of_pressed = 3
@@ -65,7 +68,12 @@ module fw_parameters
       parameter_type('damper%coefficient', of_elements), &
       parameter_type('model%loss_factor', of_matrices, not_negative), &
       parameter_type('contact%slip_speed', of_pairs, positive, of_sliding), &
-      parameter_type('contact%mu_dynamic', of_pairs, not_negative, of_sliding)]
+      parameter_type('contact%mu_dynamic', of_pairs, not_negative, of_sliding), &
+      parameter_type('mistuning%frequency', of_sectors), &
+      parameter_type('mistuning%damping_ratio', of_sectors), &
+      parameter_type('mistuning%stiffness', of_sectors), &
+      parameter_type('mistuning%mass', of_sectors), &
+      parameter_type('mistuning%scale', of_sectors)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word
@@ -141,8 +149,17 @@ contains
    elemental logical function is_per_element(number)
       integer, intent(in) :: number
 
-      is_per_element = is_per_pair(number) .or. is_per_spring(number) .or. is_of_elements(number)
+      is_per_element = is_per_pair(number) .or. is_per_spring(number) .or. &
+                       is_of_elements(number) .or. &
+                       (is_of_sectors(number) .and. number /= mistuning_scale)
    end function is_per_element
+
+   !> Whether it says how sectors differ.
+   elemental logical function is_of_sectors(number)
+      integer, intent(in) :: number
+
+      is_of_sectors = is_of(number, of_sectors)
+   end function is_of_sectors
 
    !> Whether it changes matrices of the structure.
    elemental logical function is_of_matrices(number)

@@ -22,10 +22,11 @@ module fw_ring_deviation
       real(wp), allocatable, private :: weight(:)
       !> The same rows in nodal diameters 0 .. N - 1 (n_rows, relative slots, n_sectors).
       complex(wp), allocatable :: wave(:, :, :)
-      !> Of each sector (n_rows, n_rows, n_sectors, 3).
-      real(wp), allocatable, private :: part(:, :, :, :)
+      !> Of each sector.
+      type(deviation_type), allocatable :: of
    contains
       procedure :: form
+      procedure :: form_change
       procedure :: read_rows
       procedure :: add_rows
       procedure :: add_mean
@@ -51,7 +52,7 @@ contains
 
       self%n_rows = size(deviation%rows, 1)
       self%n_sectors = cyclic%n_sectors
-      self%part = deviation%part
+      self%of = deviation
       n = cyclic%n_sectors
       allocate (self%first(self%n_rows + 1), source=1)
       allocate (self%slot(0), self%behind(0), self%weight(0))
@@ -79,9 +80,34 @@ contains
       !> (n_rows, n_rows, n_sectors)
       complex(wp), intent(out) :: matrix(:, :, :)
 
-      matrix = k*self%part(:, :, :, stiffness_part) - theta*self%part(:, :, :, mass_part) + &
-               cmplx(0.0_wp, s, wp)*self%part(:, :, :, damping_part)
+      call combine(self%of%part, k, theta, s, matrix)
    end subroutine form
+
+   !> Their derivative by one of the values that they were given by.
+   pure subroutine form_change(self, of, number, theta, s, matrix)
+      class(ring_deviation), intent(in) :: self
+      !> As in fw_deviation, and which value of the kind.
+      integer, intent(in) :: of, number
+      complex(wp), intent(in) :: theta
+      real(wp), intent(in) :: s
+      !> (n_rows, n_rows, n_sectors)
+      complex(wp), intent(out) :: matrix(:, :, :)
+      real(wp), allocatable :: part(:, :, :, :)
+
+      allocate (part, mold=self%of%part)
+      call self%of%change(of, number, part)
+      call combine(part, 1.0_wp, theta, s, matrix)
+   end subroutine form_change
+
+   pure subroutine combine(part, k, theta, s, matrix)
+      real(wp), intent(in) :: part(:, :, :, :)
+      real(wp), intent(in) :: k, s
+      complex(wp), intent(in) :: theta
+      complex(wp), intent(out) :: matrix(:, :, :)
+
+      matrix = k*part(:, :, :, stiffness_part) - theta*part(:, :, :, mass_part) + &
+               cmplx(0.0_wp, s, wp)*part(:, :, :, damping_part)
+   end subroutine combine
 
    !> The rows of every sector, from the coordinates of all (slot, sector).
    pure subroutine read_rows(self, sectors, rows)

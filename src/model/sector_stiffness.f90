@@ -14,7 +14,7 @@ module fw_sector_stiffness
    private
 
    public :: harmonic_point, slopes_of, form_sector, derive_sector, recover_sector
-   public :: observed_sector_slope, work_of_sector
+   public :: observed_by_sector, observed_sector_slope, work_of_sector
 
    !> Where a harmonic stands: factors of K, M and C in Z = k K - theta M + i s C.
    type :: harmonic_point
@@ -144,6 +144,28 @@ contains
       observed = observed + matmul(turned(basis%observe_i, point), &
                                    modes_of(basis, point, internal, load_factor, q))
    end subroutine recover_sector
+
+   !> Observed quantities of sector 0 by the coordinates.
+   subroutine observed_by_sector(basis, point, matrix)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      !> (n_observed, n_coordinates)
+      complex(wp), intent(out) :: matrix(:, :)
+      type(internal_block) :: internal
+      complex(wp), allocatable :: z_iq(:, :)
+      logical :: failed
+
+      matrix = turned(basis%observe_q, point)
+      associate (m => basis%n_coordinates, n => basis%n_internal)
+         if (n == 0) return
+         allocate (z_iq(n, m))
+         call factor_internal(basis, point, internal, failed)
+         call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
+         call add_whirl(basis, point, m, 0, z_iq)
+         call internal%solve(m, z_iq)
+         matrix = matrix - matmul(turned(basis%observe_i, point), z_iq)
+      end associate
+   end subroutine observed_by_sector
 
    !> Observed quantities by the frequency at held coordinates: the internal modes follow.
    subroutine observed_sector_slope(basis, point, slopes, load_factor, q, slope)

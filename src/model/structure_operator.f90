@@ -10,6 +10,7 @@
 !> thread. Vectors are real coefficients (coordinate, coefficient), ordered as those of
 !> fourier_type. Products are exact; a matrix Z_n is formed only where one is asked for.
 module fw_structure_operator
+   use fw_deviation, only: deviation_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
    implicit none (type, external)
@@ -100,6 +101,10 @@ module fw_structure_operator
       procedure :: own_block
       procedure :: read_own
       procedure :: add_own
+      procedure :: own_slope
+      procedure :: take_deviation
+      procedure :: pulls_observed
+      procedure :: pull_observed
    end type structure_operator
 
    abstract interface
@@ -557,5 +562,52 @@ contains
       associate (unused => self, neither => rows, nor => sectors)
       end associate
    end subroutine add_own
+
+   !> Derivative of Z q - F by one of the values in which sectors differ, at held q (n_coordinates *
+   !> n_coefficients).
+   subroutine own_slope(self, state, of, number, q, slope)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      !> As in fw_deviation, and which value of the kind.
+      integer, intent(in) :: of, number
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: slope(*)
+
+      slope(:self%n_coordinates*self%n_coefficients) = 0.0_wp
+      associate (unused => state, neither => of, nor => number, nothing => q(1))
+      end associate
+   end subroutine own_slope
+
+   !> Sectors differ by other matrices on the same rows; states are to be made anew.
+   pure subroutine take_deviation(self, deviation)
+      class(structure_operator), intent(inout) :: self
+      type(deviation_type), intent(in) :: deviation
+
+      associate (unused => self, neither => deviation)
+      end associate
+   end subroutine take_deviation
+
+   !> Whether the Z_n are symmetric, and `pull_observed` answers.
+   pure logical function pulls_observed(self)
+      class(structure_operator), intent(in) :: self
+
+      pulls_observed = .false.
+      associate (unused => self)
+      end associate
+   end function pulls_observed
+
+   !> Slopes by observed amplitudes become slopes by the coordinates: with U = O q the product of
+   !> the conjugate transpose of O, harmonic by harmonic (n_coordinates, n_retained).
+   subroutine pull_observed(self, state, observed, slope)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      !> (n_observed, n_retained)
+      complex(wp), intent(in) :: observed(:, :)
+      complex(wp), intent(out) :: slope(:, :)
+
+      slope = (0.0_wp, 0.0_wp)
+      associate (unused => self, neither => state, nor => observed)
+      end associate
+   end subroutine pull_observed
 
 end module fw_structure_operator

@@ -391,6 +391,7 @@ contains
       done = .true.
       if (.not. associated(self%view)) return
       dp = difference*abs(point%p)
+      if (.not. dp > 0.0_wp) dp = difference*self%metric%p_scale
       call self%see(point%x, point%y)
       call system%set_parameter(point%p + dp, error)
       done = .not. allocated(error)

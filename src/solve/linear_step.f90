@@ -39,6 +39,8 @@ module fw_linear_step
       logical :: worth_keeping = .false.
       !> Whether the preconditioner in use is one from before the last `prepare`.
       logical :: kept = .false.
+      !> Whether another preconditioner has been chosen that is not built yet.
+      logical, private :: has_chosen = .false.
       !> Whether LU follows where GMRES has failed: along a branch, whose tangents have to be right
       !> near folds, and in implicit steps of pseudo-time and wear. Of Newton's method at a point,
       !> an exact step of an all but singular derivative leads far away.
@@ -115,7 +117,7 @@ contains
          else
             ! The system knows whether its state is still that of the preconditioner.
             self%kept = self%keeps .and. self%worth_keeping .and. system%preconditioner_fits()
-            if (.not. self%kept) call build(self, system)
+            if (.not. self%kept .or. self%has_chosen) call build(self, system)
          end if
       else
          self%n_empty = self%n_empty + 1
@@ -131,6 +133,7 @@ contains
       call self%gmres%forget()
       self%preconditioners = self%preconditioners + 1
       self%kept = .false.
+      self%has_chosen = .false.
    end subroutine build
 
    !> GMRES; where a kept preconditioner does not serve after all, again with a fresh one.
@@ -143,6 +146,8 @@ contains
       integer :: limit, most
       logical :: is_stronger
 
+      ! A further right-hand side of the same derivative.
+      if (self%has_chosen) call build(self, system)
       ! Iterations grow with the digits asked for: only their rate compares.
       decades = -log10(tolerance)
       if (self%kept) then
@@ -161,6 +166,7 @@ contains
       self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
       if (self%gmres%iterations > too_many .and. .not. system%is_interrupted()) then
          call system%strengthen_preconditioner(is_stronger)
+         self%has_chosen = is_stronger
          if (is_stronger .and. .not. done) then
             call build(self, system)
             self%solution = 0.0_wp

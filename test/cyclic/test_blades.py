@@ -18,8 +18,7 @@ from scipy.linalg import eigh
 FILES = ["b1_frequency", "b2_matrices", "b3_stiffness_mass", "b8_rigid"]
 REFERENCE = {name: json.loads((ROOT / f"test/reference/blades/{name}.json").read_text())
              for name in FILES}
-RUNS = [(name, number) for name in FILES for number in range(len(REFERENCE[name]["runs"]))
-        if "sensitivity" not in REFERENCE[name]["runs"][number]["case"]]
+RUNS = [(name, number) for name in FILES for number in range(len(REFERENCE[name]["runs"]))]
 #: Both are solved to residuals of 1e-12; conditioning takes the rest.
 EQUAL = 1e-9
 #: Only round-off tells two ways to say the same.
@@ -139,3 +138,85 @@ def test_wrong_deviations_are_refused(tmp_path, groups, told):
                           "contact": {"law": "penalty"}, "sweep": {"values": [0.7]},
                           "harmonics": {"n_harmonics": 1}} | groups, status=3)
     assert told in done.stderr
+
+
+def test_a_check_lists_frequencies_of_all_sectors(tmp_path):
+    rng, case = sector()
+    parts, scale, change = draw(rng, case, "rows", 0.05)
+    write(tmp_path / "model.h5", case, parts)
+    groups = {"case": {"analysis": "frf"}, "model": {"source": "hdf5", "file": "model.h5"},
+              "cyclic": {"engine_order": 2, "mistuned": True}, "contact": {"law": "penalty"},
+              "sweep": {"start": 1e-3, "end": 9e9, "n_points": 2}, "harmonics": {"n_harmonics": 1},
+              "mistuning": {"scale": scale}}
+    told = run(tmp_path, groups, "--check").stdout
+    assert "natural frequencies [rad/s] of all sectors within the sweep" in told
+    (line,) = [line for line in told.splitlines() if line.startswith("!   open")]
+    whole = annulus(case, change).case["model"]
+    theta = eigh(np.array(whole["mass"]), np.array(whole["stiffness"]), eigvals_only=True)[::-1]
+    found = [float(word) for word in line.split()[2:8]]
+    assert np.allclose(found, 1.0 / np.sqrt(theta[:6]), rtol=1e-5)
+
+
+def ring_of(case, change):
+    """Mass, stiffness, damping and load of the annulus; dofs and signs of each sector in it."""
+    model, n_sectors = case["model"], case["n_sectors"]
+    right = {abs(r) - 1: (left - 1, np.sign(r)) for left, r in zip(model["left"], model["right"])}
+    inner = [i for i in range(len(model["mass"])) if i not in right]
+    place = {i: p for p, i in enumerate(inner)}
+    own = [right.get(i, (i, 1)) for i in range(len(model["mass"]))]
+    sign = np.array([s for _, s in own], float)
+    dofs = np.array([[(j + (i in right)) % n_sectors * len(inner) + place[source]
+                      for i, (source, _) in enumerate(own)] for j in range(n_sectors)])
+    size = n_sectors * len(inner)
+    matrices = [np.zeros((size, size)) for _ in range(3)]
+    load = np.zeros(size, complex)
+    force = np.array(case["load"]["cosine"]) - 1j * np.array(case["load"]["sine"])
+    for j, at in enumerate(dofs):
+        for whole, key in zip(matrices, ("mass", "stiffness", "damping")):
+            np.add.at(whole, (at[:, None], at), np.outer(sign, sign)
+                      * (np.array(model[key]) + change[key][j]))
+        np.add.at(load, at, sign * force * np.exp(
+            -2j * np.pi * j * case["engine_order"] / n_sectors))
+    return matrices, load, dofs, sign
+
+
+@pytest.mark.parametrize("n_pairs", [0, 1])
+def test_more_rows_than_are_factored_together(tmp_path, n_pairs):
+    """170 sectors that differ in all of their dofs: waves alone precondition."""
+    rng, case = sector(n_sectors=170)
+    parts, scale, change = draw(rng, case, "full", 0.05)
+    groups = {"case": {"analysis": "point"}, "model": {"source": "hdf5", "file": "model.h5"},
+              "cyclic": {"engine_order": case["engine_order"], "mistuned": True},
+              "mistuning": {"scale": scale}, "sweep": {"start": 0.95},
+              "solver": {"tolerance": 1e-11},
+              "harmonics": {"n_harmonics": 1, "sampling": "uniform", "n_time": 64}}
+    if n_pairs:
+        groups["contact"] = {"law": "penalty"}
+    else:
+        case["contact"] = {"side_1": []}
+    write(tmp_path / "model.h5", case, parts)
+    run(tmp_path, groups)
+    result = read(tmp_path / "case.h5")
+    assert result["converged"].all()
+    found = result["coefficients"][0, 1] - 1j * result["coefficients"][0, 2]
+    (mass, stiffness, damping), load, dofs, sign = ring_of(case, change)
+    residual = load.copy()
+    motion = np.zeros(len(load), complex)
+    motion[dofs] = sign * found.reshape(dofs.shape)
+    if n_pairs:
+        # Forces of the pairs as they are written, on the dofs of either side.
+        force = result["contact/force"][0, 1] - 1j * result["contact/force"][0, 2]
+        for j, at in enumerate(dofs):
+            for pair, (a, b, s) in enumerate(zip(case["contact"]["side_1"],
+                                                 case["contact"]["side_2"],
+                                                 case["contact"]["sector_2"])):
+                other = dofs[(j + s) % len(dofs)]
+                for c in range(3):
+                    for dof, there, side in ((a[c], at, 1), (b[c], other, -1)):
+                        if dof:
+                            residual[there[abs(dof) - 1]] -= (
+                                side * np.sign(dof) * sign[abs(dof) - 1]
+                                * force[j * len(case["contact"]["side_1"]) + pair, c])
+    residual -= (stiffness - 0.95**2 * mass + 0.95j * damping) @ motion
+    # Of the forces before they cancel.
+    assert np.abs(residual).max() < EQUAL * np.abs(stiffness @ motion).max()

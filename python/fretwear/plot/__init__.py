@@ -7,6 +7,7 @@
 """
 
 from .backbone import plot_backbone
+from .blades import plot_blades, plot_content
 from .campaigns import plot_campbell, plot_damping, plot_force, read_damping
 from .command import add_arguments, main
 from .convergence import plot_convergence
@@ -31,9 +32,9 @@ from .together import plot_envelope, plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
-           "half_power_damping", "main", "plot_backbone", "plot_calibration", "plot_campbell",
-           "plot_convergence", "plot_cycle", "plot_damping", "plot_envelope",
-           "plot_flanks", "plot_force", "plot_harmonics",
+           "half_power_damping", "main", "plot_backbone", "plot_blades", "plot_calibration",
+           "plot_campbell", "plot_content", "plot_convergence", "plot_cycle", "plot_damping",
+           "plot_envelope", "plot_flanks", "plot_force", "plot_harmonics",
            "plot_hysteresis", "plot_mission", "plot_mode", "plot_nodal_diameters", "plot_optimum",
            "plot_resonance", "plot_response", "plot_responses", "plot_safe", "plot_sensitivity",
            "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",

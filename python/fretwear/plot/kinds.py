@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ..errors import NotBuiltError
 from ..result import Result
 from .backbone import plot_backbone
+from .blades import plot_blades, plot_content
 from .campbell import plot_campbell_result
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
@@ -90,6 +91,10 @@ def _has_diameters(result: Result) -> bool:
     return "modes/open" in result and len(result["modes/open"]) > 1
 
 
+def _has_blades(result: Result) -> bool:
+    return "blades/largest" in result and result.n_points > 0 and bool(result.converged.any())
+
+
 #: Every kind of picture, in the order in which a report shows them.
 KINDS: dict[str, Kind] = {
     "response": Kind(
@@ -118,6 +123,9 @@ KINDS: dict[str, Kind] = {
     "wave": Kind("Wave over the sectors", lambda r: (
         "coefficients" in r and r.n_points > 0 and "engine_order" in r.attributes
         and bool(r.converged.any())), lambda r, c: plot_wave(r, c.point, c.observe)),
+    "blades": Kind("All sectors", _has_blades, lambda r, c: plot_blades(r, c.observe)),
+    "content": Kind("Waves of sectors that differ", _has_blades,
+                    lambda r, c: plot_content(r, c.point, c.observe)),
     "nodal_diameters": Kind("Frequencies over the nodal diameter", _has_diameters,
                             lambda r, c: plot_nodal_diameters(r)),
     "safe": Kind("Engine orders at a speed",
