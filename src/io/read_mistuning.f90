@@ -15,7 +15,9 @@ module fw_read_mistuning
    use fw_linalg, only: solve_symmetric_eigen
    use fw_matrix_checks, only: check_matrix
    use fw_mistuning_parts, only: mistuning_parts, sector_parts
+   use fw_population_options, only: population_options
    use fw_raw_model, only: raw_model
+   use fw_read_population, only: take_patterns
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -91,12 +93,15 @@ contains
    end function asks_for_sectors
 
    !> What sectors have beside each other; nothing where that is nothing.
-   subroutine read_mistuning(reader, raw, cyclic)
+   subroutine read_mistuning(reader, raw, cyclic, population)
       type(reader_type), intent(inout) :: reader
       !> The model as it was given; takes what the group says.
       type(raw_model), intent(inout) :: raw
       !> Takes the deviation of the matrices.
       type(cyclic_type), intent(inout) :: cyclic
+      !> Takes patterns, whose rows are among those of the deviation; not allocated of a case that
+      !> is no population.
+      type(population_options), allocatable, intent(inout) :: population
       type(mistuning_options) :: options
 
       call options%bind_keys(reader)
@@ -108,6 +113,9 @@ contains
       end if
       call merge_parts(reader, options, cyclic%n_sectors, raw%mistuning)
       if (reader%failed()) return
+      if (allocated(population)) call take_patterns(reader, options%scale, cyclic%n_sectors, &
+                                                    cyclic%is_mistuned, raw%mistuning, population)
+      if (reader%failed()) return
       if (.not. cyclic%is_mistuned) then
          if (abs(options%scale) > 0.0_wp .and. raw%mistuning%deviates()) call reader%refuse( &
             'cyclic', 'mistuned', '= .false., but the sectors differ (&mistuning, or '// &
@@ -117,7 +125,7 @@ contains
       if (.not. raw%mistuning%deviates()) return
       call check_parts(reader, options%scale, raw, cyclic%n_sectors)
       if (reader%failed() .or. abs(options%scale) <= 0.0_wp) return
-      call form_deviation(options%scale, raw, cyclic)
+      call form_deviation(options%scale, raw, cyclic, allocated(population))
       call check_masses(reader, raw, cyclic)
    end subroutine read_mistuning
 
@@ -314,13 +322,15 @@ contains
    end subroutine check_sector
 
    !> Rows that all sectors share, then the matrices of each on them.
-   subroutine form_deviation(scale, raw, cyclic)
+   subroutine form_deviation(scale, raw, cyclic, keeps_rows)
       !> Of all deviations.
       real(wp), intent(in) :: scale
       !> With parts that fit each other.
       type(raw_model), intent(inout) :: raw
       !> Its deviation is formed here.
       type(cyclic_type), intent(inout) :: cyclic
+      !> Rows stay where nothing deviates yet.
+      logical, intent(in) :: keeps_rows
       type(deviation_type) :: deviation
       integer :: j
 
@@ -361,7 +371,7 @@ contains
             end associate
          end do
       end associate
-      if (all(abs(deviation%part) <= 0.0_wp)) return
+      if (all(abs(deviation%part) <= 0.0_wp) .and. .not. keeps_rows) return
       cyclic%deviation = deviation
 
    contains
