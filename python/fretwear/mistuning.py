@@ -40,6 +40,8 @@ class Mistuning:
     sectors : mapping, optional
         Number of a sector, from 0, with its matrices "K", "M", "C" (n_dof, n_dof): what is added to
         the tuned ones, or, with "kind": "full", what stands in their place.
+    patterns : (n_patterns, n_sectors) or (n_patterns, n_sectors, n_rows), optional
+        Of ``analysis = 'population'``: each stands in place of `frequency`.
 
     Raises
     ------
@@ -56,6 +58,7 @@ class Mistuning:
     blade_stiffness: ArrayLike | None = None
     blade_mass: ArrayLike | None = None
     sectors: Mapping[int, Mapping[str, Any]] | None = None
+    patterns: ArrayLike | None = None
 
     def checked(self, n_dof: int, n_sectors: int) -> Mistuning:
         """The same with arrays."""
@@ -66,17 +69,17 @@ class Mistuning:
             n_rows = len(found["rows"])
         if self.row_omega is not None:
             found["row_omega"] = array("mistuning.row_omega", self.row_omega, (n_rows,))
-        for name in ("frequency", "damping_ratio"):
+        for name, before in (("frequency", ()), ("damping_ratio", ()), ("patterns", (None,))):
             if (value := getattr(self, name)) is None:
                 continue
             if n_rows is None:
                 raise InputError(f"mistuning.{name}: is given without rows, must have rows and "
                                  "row_omega beside it")
-            if np.ndim(value) == 1:
-                each = array(f"mistuning.{name}", value, (n_sectors,))
-                value = np.repeat(each[:, None], n_rows, axis=1)
+            if np.ndim(value) == len(before) + 1:
+                each = array(f"mistuning.{name}", value, (*before, n_sectors))
+                value = np.repeat(each[..., None], n_rows, axis=-1)
             found[name] = np.ascontiguousarray(
-                array(f"mistuning.{name}", value, (n_sectors, n_rows)))
+                array(f"mistuning.{name}", value, (*before, n_sectors, n_rows)))
         for name in ("stiffness", "mass"):
             if (value := getattr(self, name)) is not None:
                 found[name] = array(f"mistuning.{name}", value, (n_sectors,))

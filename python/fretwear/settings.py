@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 __all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic", "Damper",
            "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output", "Polynomial",
-           "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Stress", "Structure",
-           "Sweep", "Time", "User", "Wear"]
+           "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Stress",
+           "Structure", "Sweep", "Time", "User", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -87,8 +87,9 @@ class CaseGroup(TypedDict, total=False):
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
     #: a sweep, one frequency, wear at one frequency, integration in time, natural frequencies, a
-    #: nonlinear mode, a resonance, or a Campbell diagram (default: 'frf')
-    analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell"]
+    #: nonlinear mode, a resonance, a Campbell diagram, or many mistuned dis (default: 'frf')
+    analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
+                      "population"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
@@ -214,6 +215,20 @@ class Cyclic(TypedDict, total=False):
     #: the same of the right one, which moves as the left one of the next sector; negative: with its
     #: sign turned (default: of the file)
     right: ArrayLike
+
+
+class Population(TypedDict, total=False):
+    """Group &population: the largest amplitude of disks whose blade frequencies differ."""
+
+    #: disks: the first patterns; 0: all that there are (default: 0)
+    n_patterns: int
+    #: look for maxima between the rows of the sweep (default: .true.)
+    peaks: bool
+    #: which amplitude: of the first harmonic, or the largest deflection (default: 'first_harmonic')
+    quantity: Literal["first_harmonic", "largest"]
+    #: by which part the blade frequencies are above the tuned ones, pattern after pattern, each as
+    #: mistuning%frequency; only: analysis = 'population' (default: /mistuning/patterns of the file)
+    patterns: ArrayLike
 
 
 class Mistuning(TypedDict, total=False):
@@ -799,6 +814,7 @@ class Groups(TypedDict, total=False):
     resonance: Resonance
     structure: Structure
     cyclic: Cyclic
+    population: Population
     mistuning: Mistuning
     contact: Contact
     spring: Spring

@@ -52,7 +52,8 @@ def mistuned() -> fw.Model:
     rows = np.ones((2, 6))
     return whole(sectors=fw.Sectors(3, [1], [-4]), mistuning=fw.Mistuning(
         rows, [1.0, 2.0], [0.1, 0.0, -0.1], np.zeros((3, 2)), [0.1, 0.0, 0.0], [0.0, 0.0, 0.1],
-        EYE, EYE, {0: {"K": EYE, "M": EYE, "C": EYE}, 2: {"K": EYE, "kind": "full"}}))
+        EYE, EYE, {0: {"K": EYE, "M": EYE, "C": EYE}, 2: {"K": EYE, "kind": "full"}},
+        np.zeros((4, 3, 2))))
 
 
 def nodal() -> fw.Model:

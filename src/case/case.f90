@@ -10,6 +10,7 @@ module fw_case
    use fw_mission_options, only: mission_options
    use fw_mode_options, only: mode_options
    use fw_parameter_sweep, only: parameter_sweep
+   use fw_population_options, only: population_options
    use fw_control_options, only: control_options
    use fw_harmonics_options, only: harmonics_options
    use fw_resonance_options, only: resonance_options
@@ -24,7 +25,8 @@ module fw_case
 
    public :: analyses, case_type, output_options
    public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
-             analysis_modes, analysis_mode, analysis_resonance, analysis_campbell
+             analysis_modes, analysis_mode, analysis_resonance, analysis_campbell, &
+             analysis_population
 
    !> What the program knows of an analysis beside its word. A new one is a row of `analyses`, a
    !> line in fw_run and a file of its own.
@@ -42,15 +44,18 @@ module fw_case
       logical :: wears = .false., is_resonance = .false., is_integrated = .false.
       !> Over the rotation speed, which other analyses have one of.
       logical :: is_campbell = .false.
+      !> Points of many disks, of which the largest counts: none is a row of the result.
+      logical :: is_population = .false.
    end type analysis_facts
 
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
                          analysis_time = 4, analysis_modes = 5, analysis_mode = 6, &
-                         analysis_resonance = 7, analysis_campbell = 8
+                         analysis_resonance = 7, analysis_campbell = 8, &
+                         analysis_population = 9
    !> In the order of the constants.
    character(*), parameter :: analysis_words(*) = &
-      [character(9) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance', &
-                       'campbell']
+      [character(10) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance', &
+                        'campbell', 'population']
    type(analysis_facts), parameter :: analyses(*) = [ &
       analysis_facts(is_response=.true., is_sweep=.true.), &
       analysis_facts(is_response=.true.), &
@@ -59,7 +64,8 @@ module fw_case
       analysis_facts(has_points=.false., is_balanced=.false.), &
       analysis_facts(is_free=.true., finds_frequency=.true.), &
       analysis_facts(is_resonance=.true., finds_frequency=.true.), &
-      analysis_facts(is_campbell=.true., has_points=.false., is_balanced=.false.)]
+      analysis_facts(is_campbell=.true., has_points=.false., is_balanced=.false.), &
+      analysis_facts(is_population=.true., is_response=.true., is_sweep=.true.)]
 
    !> What is written (group &output).
    type :: output_options
@@ -118,6 +124,8 @@ module fw_case
       type(resonance_options) :: resonance
       type(stress_options) :: stress
       type(campbell_options) :: campbell
+      !> Not allocated of a case that is none.
+      type(population_options), allocatable :: population
       !> What others are read from; not allocated where none is.
       type(case_source), allocatable :: source
    contains
@@ -144,7 +152,8 @@ contains
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
                               'integration in time, natural frequencies, a nonlinear '// &
-                              'mode, a resonance, or a Campbell diagram'), &
+                              'mode, a resonance, a Campbell diagram, or many '// &
+                              'mistuned disks'), &
                           self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)

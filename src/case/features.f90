@@ -4,7 +4,8 @@
 !> 'a law' are facts of the law of the pairs: a new law needs no new phrase.
 module fw_features
    use fw_case, only: analysis_campbell, analysis_frf, analysis_mode, analysis_modes, &
-      analysis_point, analysis_resonance, analysis_time, analysis_wear, case_type
+      analysis_point, analysis_population, analysis_resonance, analysis_time, analysis_wear, &
+      case_type
    use fw_contact_data, only: memory_carried
    use fw_control_options, only: of_first_harmonic
    use fw_force_law, only: law_facts
@@ -33,7 +34,8 @@ module fw_features
       hysteretic = 'structural damping (loss_factor) or forces of the air', &
       stress = 'stress (group &stress, /stress of the model file)', &
       growing_stability = 'sweep%stability = .true. where gaps or normal loads grow', &
-      of_campbell = "case%analysis = 'campbell'"
+      of_campbell = "case%analysis = 'campbell'", &
+      of_population = "case%analysis = 'population'"
 
 contains
 
@@ -107,6 +109,8 @@ contains
          asked = a /= analysis_frf
       case ("case%analysis other than 'frf' or 'point'")
          asked = all(a /= [analysis_frf, analysis_point])
+      case (of_population)
+         asked = a == analysis_population
       case ("case%analysis other than 'frf', 'point', 'resonance' or 'mode'")
          asked = all(a /= [analysis_frf, analysis_point, analysis_resonance, analysis_mode])
       case (of_campbell)

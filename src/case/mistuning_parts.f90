@@ -25,6 +25,8 @@ module fw_mistuning_parts
       real(wp), allocatable :: stiffness(:), mass(:)
       !> Of the blade alone (n_dof, n_dof).
       real(wp), allocatable :: blade_stiffness(:, :), blade_mass(:, :)
+      !> Of frequencies, each in place of `frequency` (n_rows, n_sectors, n_patterns).
+      real(wp), allocatable :: patterns(:, :, :)
       !> Sector j at place j + 1.
       type(sector_parts), allocatable :: sector(:)
    contains
@@ -63,6 +65,8 @@ contains
                         'symmetric'), self%blade_stiffness)
       call to%bind(part('mistuning/blade_mass', square, 'mass of the blade alone, symmetric'), &
                    self%blade_mass)
+      call to%bind(part('mistuning/patterns', 'pattern sector row', "patterns of analysis = "// &
+                        "'population': each stands in place of frequency"), self%patterns)
       call to%numbers(part(of_sector, '', ''), 0, max(1, n_sectors) - 1, numbers)
       do i = 1, size(numbers)
          to%number = numbers(i)

@@ -7,7 +7,7 @@ module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_features, only: growing_stability, asks_for, feature_length, feature_text, hysteretic, &
-      matrices_alone, of_campbell, stress
+      matrices_alone, of_campbell, of_population, stress
    implicit none (type, external)
    private
 
@@ -134,7 +134,11 @@ module fw_rules
 
    !> The speed goes from one end of the diagram to the other.
    type(rule_type), parameter :: of_diagrams(*) = [ &
-      rule_type(of_campbell, 'model%rotation_speed', 'give campbell%start and end')]
+      rule_type(of_campbell, 'model%rotation_speed', 'give campbell%start and end'), &
+      rule_type(of_population, "sweep%continuation = 'arclength'", "use 'natural'"), &
+      rule_type(of_population, 'sweep%refine = .true.', 'rows are not kept; leave it out'), &
+      rule_type(of_population, 'output%histories', 'points are not kept; leave it out'), &
+      rule_type(of_population, "contact%memory = 'carried'", "use 'assembly'")]
 
    !> Matrices without a time domain, or those that this part of the program does not take.
    type(rule_type), parameter :: of_matrices(*) = [ &

@@ -104,6 +104,9 @@ module fw_remark_table
       remark_kind('campbell points', &
                   'campbell: frequencies near a crossing that could not be solved: its peak '// &
                   'may be missed'), &
+      remark_kind('population peaks', &
+                  'population: maxima between rows that took more solutions than they may: '// &
+                  'the largest amplitude that was solved stands for them'), &
       remark_kind('derivatives of instants', &
                   '&sensitivity with contact decided at instants: take sampling = '// &
                   '''events'''), &

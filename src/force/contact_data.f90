@@ -5,7 +5,7 @@
 !> of motion; lambda_n <= 0 is compression.
 module fw_contact_data
    use fw_kinds, only: wp
-   use fw_law_constants, only: law_constants
+   use fw_law_constants, only: law_constants, level_values
    use fw_text, only: string_type
    use fw_worn_friction, only: worn_friction
    implicit none (type, external)
@@ -75,6 +75,7 @@ module fw_contact_data
    contains
       procedure :: turn
       procedure :: has_growth
+      procedure :: level => level_sectors
    end type contact_type
 
    !> Nonlinear springs: force coefficient * u_r**power (group &spring).
@@ -103,6 +104,22 @@ contains
       ! A load that has gone presses no more.
       self%normal_load = max(0.0_wp, self%normal_load + speed**2*self%normal_load_rotation)
    end subroutine turn
+
+   !> Pairs of all sectors become alike, each value the mean over the sectors.
+   pure subroutine level_sectors(self)
+      class(contact_type), intent(inout) :: self
+
+      call level_values(self%n_alike, self%mu)
+      call level_values(self%n_alike, self%gap)
+      call level_values(self%n_alike, self%depth)
+      call level_values(self%n_alike, self%area)
+      call level_values(self%n_alike, self%normal_load)
+      call level_values(self%n_alike, self%gap_rotation)
+      call level_values(self%n_alike, self%normal_load_rotation)
+      call level_values(self%n_alike, self%tangential_stiffness)
+      call level_values(self%n_alike, self%normal_stiffness)
+      call self%constants%level(self%n_alike)
+   end subroutine level_sectors
 
    !> Whether gaps or normal loads depend on the rotation speed.
    pure logical function has_growth(self)

@@ -7,7 +7,7 @@ module fw_law_constants
    implicit none (type, external)
    private
 
-   public :: law_constants
+   public :: law_constants, level_values
 
    type :: constant_type
       character(24) :: name = ''
@@ -51,6 +51,7 @@ module fw_law_constants
       procedure :: is_of_law
       procedure :: is_taken
       procedure :: first_wrong
+      procedure :: level
    end type law_constants
 
 contains
@@ -101,6 +102,33 @@ contains
       call keys%bind(shown, new%values, is_needed .and. k == 0)
       self%constant = [self%constant, new]
    end subroutine bind
+
+   !> The mean over sectors in place of the values of each.
+   pure subroutine level(self, n_alike)
+      class(law_constants), intent(inout) :: self
+      !> Sectors that the pairs are of, one after another.
+      integer, intent(in) :: n_alike
+      integer :: k
+
+      if (.not. allocated(self%constant)) return
+      do k = 1, size(self%constant)
+         call level_values(n_alike, self%constant(k)%values)
+      end do
+   end subroutine level
+
+   !> The same of one value for each pair.
+   pure subroutine level_values(n_alike, values)
+      integer, intent(in) :: n_alike
+      !> (n_pairs); nothing is done where it is not allocated.
+      real(wp), allocatable, intent(inout) :: values(:)
+      real(wp), allocatable :: sectors(:, :)
+
+      if (.not. allocated(values) .or. n_alike < 2) return
+      sectors = reshape(values, [size(values)/n_alike, n_alike])
+      ! Equal ones stay as they are, to the bit.
+      if (all(abs(sectors - spread(sectors(:, 1), 2, n_alike)) <= 0.0_wp)) return
+      values = reshape(spread(sum(sectors, dim=2)/n_alike, 2, n_alike), [size(values)])
+   end subroutine level_values
 
    !> The law that declares now has this constant.
    subroutine note_law(self, key, needed)

@@ -121,10 +121,10 @@ contains
             return
          end if
       end if
-      if (part%shape == 'sector row' .and. found) then
+      if (index(part%shape, 'sector row') > 0 .and. found) then
          call get_shape(self%file, name, dims, self%error)
          if (allocated(self%error)) return
-         if (size(dims) == 1) then
+         if (size(dims) == rank - 1) then
             call self%read_spread(part, name)
             return
          end if
@@ -168,15 +168,16 @@ contains
       real(wp), allocatable :: values(:)
       integer :: n, r
 
-      call read_dataset(self%file, name, 1, self%dims, self%reals, self%error)
+      call read_dataset(self%file, name, size(self%extents_of(part)) - 1, self%dims, self%reals, &
+                        self%error)
       if (allocated(self%error)) return
-      n = self%dims(1)
-      r = max(1, self%extent_of(part%shape(8:)))
+      r = max(1, self%extent_of('row'))
       values = self%reals
+      n = r*size(values)
       deallocate (self%reals)
-      allocate (self%reals(n*r))
-      self%reals = reshape(spread(values, 1, r), [n*r])
-      self%dims = [r, n]
+      allocate (self%reals(n))
+      self%reals = reshape(spread(values, 1, r), [n])
+      self%dims = [r, self%dims]
    end subroutine read_spread
 
    !> Refuse other extents than those that are known, and take those that are not.

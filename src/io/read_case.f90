@@ -19,8 +19,8 @@ module fw_read_case
    use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
-   use fw_read_options, only: read_campbell, read_harmonics, read_mission, read_mode, read_stress, &
-      read_sweep
+   use fw_read_options, only: read_campbell, read_harmonics, read_mission, read_mode, &
+      read_population, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
    use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
@@ -431,7 +431,9 @@ contains
       call read_cyclic(reader, raw%cyclic, n_dof, analyses(case%analysis)%has_points, &
                        case%model%cyclic)
       if (.not. allocated(raw%mistuning)) allocate (raw%mistuning)
-      call read_mistuning(reader, raw, moves_sectors(reader, case), case%model%cyclic)
+      call read_population(reader, case%analysis, case%population)
+      call read_mistuning(reader, raw, moves_sectors(reader, case), case%model%cyclic, &
+                          case%population)
       options%speed_order = speed_order_of(reader)
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &

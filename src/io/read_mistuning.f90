@@ -16,7 +16,9 @@ module fw_read_mistuning
    use fw_linalg, only: solve_symmetric_eigen
    use fw_matrix_checks, only: check_matrix
    use fw_mistuning_parts, only: mistuning_parts, sector_parts
+   use fw_population_options, only: population_options
    use fw_raw_model, only: raw_model
+   use fw_read_population, only: take_patterns
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -92,15 +94,19 @@ contains
    end function asks_for_sectors
 
    !> What sectors have beside each other; nothing where that is nothing.
-   subroutine read_mistuning(reader, raw, keeps, cyclic)
+   subroutine read_mistuning(reader, raw, moves, cyclic, population)
       type(reader_type), intent(inout) :: reader
       !> The model as it was given; takes what the group says.
       type(raw_model), intent(inout) :: raw
       !> Deviations of 0 too: derivatives are taken by them, or their scale moves.
-      logical, intent(in) :: keeps
+      logical, intent(in) :: moves
       !> Takes the deviation of the matrices.
       type(cyclic_type), intent(inout) :: cyclic
+      !> Takes patterns, whose rows are among those of the deviation; not allocated of a case that
+      !> is no population.
+      type(population_options), allocatable, intent(inout) :: population
       type(mistuning_options) :: options
+      logical :: keeps
 
       call options%bind_keys(reader)
       if (reader%failed()) return
@@ -111,6 +117,9 @@ contains
       end if
       call merge_parts(reader, options, cyclic%n_sectors, raw%mistuning)
       if (reader%failed()) return
+      if (allocated(population)) call take_patterns(reader, options%scale, cyclic%n_sectors, &
+                                                    cyclic%is_mistuned, raw%mistuning, population)
+      if (reader%failed()) return
       if (.not. cyclic%is_mistuned) then
          if (abs(options%scale) > 0.0_wp .and. raw%mistuning%deviates()) call reader%refuse( &
             'cyclic', 'mistuned', '= .false., but the sectors differ (&mistuning, or '// &
@@ -119,6 +128,7 @@ contains
       end if
       if (.not. raw%mistuning%deviates()) return
       call check_parts(reader, options%scale, raw, cyclic%n_sectors)
+      keeps = moves .or. allocated(population)
       if (reader%failed() .or. (abs(options%scale) <= 0.0_wp .and. .not. keeps)) return
       call form_deviation(options%scale, raw, keeps, cyclic)
       call check_masses(reader, raw, cyclic)

@@ -12,6 +12,7 @@ module fw_read_options
    use fw_parameter_sweep, only: parameter_sweep
    use fw_parameters, only: parameter_words
    use fw_read_mission, only: read_mission
+   use fw_read_population, only: read_population
    use fw_reader, only: reader_type
    use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength, &
       continuation_natural
@@ -21,7 +22,8 @@ module fw_read_options
    implicit none (type, external)
    private
 
-   public :: read_campbell, read_harmonics, read_mission, read_mode, read_stress, read_sweep
+   public :: read_campbell, read_harmonics, read_mission, read_mode, read_population, read_stress, &
+             read_sweep
 
    !> Responses that are put together from a mode.
    integer, parameter :: most_scales = 100

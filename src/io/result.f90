@@ -96,8 +96,9 @@ contains
       if (allocated(error)) return
       if (allocated(case%model%unit_system)) self%unit_system = case%model%unit_system
       call write_head(self, case, error)
-      ! Natural frequencies are no points.
-      if (.not. allocated(error) .and. analyses(case%analysis)%has_points) then
+      ! Natural frequencies are no points, and those of a population are not kept.
+      if (.not. allocated(error) .and. analyses(case%analysis)%has_points .and. &
+          .not. analyses(case%analysis)%is_population) then
          call self%rows%create(self%file, case, error)
       end if
       if (.not. allocated(error)) call flush_file(self, error)

@@ -69,7 +69,7 @@ contains
    subroutine put_integers(self, name, values, unit, dimensions, long_name)
       class(group_writer), intent(inout) :: self
       character(*), intent(in) :: name, unit, dimensions, long_name
-      integer, intent(in), contiguous :: values(:)
+      integer, intent(in), contiguous :: values(..)
 
       if (allocated(self%error)) return
       call write_dataset(self%file, name, values, self%error)
