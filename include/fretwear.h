@@ -90,6 +90,8 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    n_dof * n_dof: "mass", "stiffness" (both required), "damping", "stiffness_rotation"; symmetric;
                   "structural_damping", symmetric; row after row "coriolis", skew, and
                   "circulatory", "stiffness_unsymmetric", "damping_unsymmetric", any
+   n_dof * n_dof: "speed/I/stiffness", n_dof: "speed/I/static", at the 2 to 4 rotation speeds
+                  "speed/value" (I from 0), in place of "stiffness" and "stiffness_rotation"
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
                   "contact/gap_rotation", "contact/normal_load_rotation",

@@ -18,6 +18,7 @@ from ._native import Session, unread_parts
 from .elements import Elements, checked_elements, read_elements
 from .errors import InputError, NotBuiltError, OutputError
 from .mistuning import Mistuning, read_mistuning
+from .speeds import read_speeds, speed_datasets
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
 from .stress import OF_PICTURES, Stress, read_stress
@@ -223,6 +224,10 @@ class Model:
     sectors : Sectors, optional
         Makes the model one of equal sectors around an axis. With matrices of nodal diameters M, C
         and K are None.
+    speeds : mapping, optional
+        2 to 4 rotation speeds [rad/s], each with the stiffness (n_dof, n_dof) there, or with a
+        pair of it and of a static load (n_dof,); polynomials in the square of the speed go through
+        them. In place of stiffness_rotation and static_rotation; K may be None then.
     observe : mapping, optional
         Name of every observed quantity, with a dof number, counted from 1, or with a row of
         factors (n_dof,). Every dof without it.
@@ -252,10 +257,11 @@ class Model:
                  base_dof: ArrayLike | None = None, base_direction: ArrayLike | None = None,
                  load_table: ArrayLike | None = None, stress: Stress | None = None,
                  mistuning: Mistuning | None = None,
+                 speeds: Mapping[float, Any] | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
-        n = self.n_dof = _order(M, C, K, sectors)
+        n = self.n_dof = _order(M, C, M if K is None and speeds is not None else K, sectors)
         if n == 0:
             raise InputError("K: is empty, must have at least one degree of freedom")
         self._matrices = {
@@ -310,6 +316,8 @@ class Model:
             raise InputError("mistuning: is given without sectors, must have Sectors beside it")
         self.mistuning = (None if mistuning is None or self.sectors is None
                           else mistuning.checked(n, self.sectors.n_sectors))
+        #: Datasets of matrices at several speeds.
+        self._speeds = {} if speeds is None else speed_datasets(speeds, n)
         self._observe = None if observe is None else _rows(observe, n)
         if observe is not None and self._diameter_names() is not None:
             raise InputError("observe: is given beside rows of nodal diameters, must be one of "
@@ -455,6 +463,8 @@ class Model:
                 raise InputError(f"{path}: format is '{kind}', expected '{FORMAT}'")
             _warn_of_strangers(path)
             for name in ("mass", "stiffness"):
+                if name == "stiffness" and "speed" in file:
+                    continue
                 if name not in file and "nodal_diameter" not in file:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
@@ -473,7 +483,7 @@ class Model:
                     stiffness_rotation=found.get("stiffness_rotation"),
                     base_dof=found.get("base/dof"), base_direction=found.get("base/direction"),
                     load_table=found.get("load/table"), stress=read_stress(file),
-                    mistuning=read_mistuning(file),
+                    mistuning=read_mistuning(file), speeds=read_speeds(file),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -533,7 +543,7 @@ class Model:
 
     def _datasets(self) -> dict[str, NDArray[Any]]:
         """What a session takes as parts of a model, by the names in a model file."""
-        found: dict[str, NDArray[Any]] = {**self._matrices, **self._moved}
+        found: dict[str, NDArray[Any]] = {**self._matrices, **self._speeds, **self._moved}
         found.update((name, self._loads[argument]) for name, argument in _LOADS.items()
                      if argument in self._loads)
         if self._harmonic:

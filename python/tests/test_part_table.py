@@ -73,6 +73,8 @@ MODELS = {
     "mistuned": mistuned,
     "supports": lambda: whole(base_dof=[1, -2]),
     "ground": lambda: whole(base_direction=EYE[0]),
+    "speeds": lambda: fw.Model(EYE, None, None, speeds={0.0: (EYE, EYE[0]),
+                                                       2.0: (2.0 * EYE, EYE[1])}),
     "nodal": nodal}
 
 
@@ -95,7 +97,8 @@ def names_in(path: Path) -> set[str]:
         for group in ("", "contact", "cyclic", "polynomial", "mistuning/sector/2"):
             if group in file or not group:
                 found |= {f"{group}@{name}" for name in file[group or "/"].attrs}
-    found = {re.sub(r"^mistuning/sector/\d+", "mistuning/sector/M", name) for name in found}
+    found = {re.sub(r"^mistuning/sector/\d+", "mistuning/sector/J", name) for name in found}
+    found = {re.sub(r"^speed/\d+", "speed/I", name) for name in found}
     found = {re.sub(r"^nodal_diameter/\d+", "nodal_diameter/K", name) for name in found}
     return {re.sub(r"^(aero/\w+)/-?\d+", r"\1/M", name) for name in found}
 

@@ -273,7 +273,7 @@ contains
       type(spring_type), intent(in) :: springs
       type(element_list), intent(in) :: elements
       logical, intent(out), allocatable :: moving(:)
-      integer :: i, c, n_moving
+      integer :: i, c, n_moving, p
       logical :: interferes
 
       allocate (moving(0:model%n_dof), source=.false.)
@@ -284,8 +284,8 @@ contains
       end if
       moving(1:) = sum(abs(model%load_columns()), dim=2) > 0.0_wp
       if (allocated(model%cyclic%speed)) then
-         if (allocated(model%cyclic%speed%load)) moving(1:) = moving(1:) .or. &
-            abs(model%cyclic%speed%load) > 0.0_wp
+         if (allocated(model%cyclic%speed%growth%load)) moving(1:) = moving(1:) .or. &
+            any(abs(model%cyclic%speed%growth%load) > 0.0_wp, dim=2)
       end if
       do i = 1, contact%n_pairs
          ! An interference pushes both sides.
@@ -312,7 +312,10 @@ contains
             associate (speed => model%cyclic%speed)
                call couple_by(speed%coriolis)
                call couple_by(speed%circulatory)
-               call couple_by(speed%stiffness)
+               if (.not. allocated(speed%growth%stiffness)) cycle
+               do p = 1, size(speed%growth%stiffness, 3)
+                  moving(1:) = moving(1:) .or. abs(speed%growth%stiffness(:, i, p)) > 0.0_wp
+               end do
             end associate
          end do
          do i = 1, contact%n_pairs
@@ -393,8 +396,8 @@ contains
 
       symmetric = all(abs(model%load_static) <= 0.0_wp)
       if (allocated(model%cyclic%speed)) then
-         if (allocated(model%cyclic%speed%load)) symmetric = symmetric .and. &
-            all(abs(model%cyclic%speed%load) <= 0.0_wp)
+         if (allocated(model%cyclic%speed%growth%load)) symmetric = symmetric .and. &
+            all(abs(model%cyclic%speed%growth%load) <= 0.0_wp)
       end if
       if (model%waves%n_waves() > 0) symmetric = symmetric .and. &
          all(modulo(model%waves%harmonic, 2) == 1)

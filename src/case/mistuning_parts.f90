@@ -34,7 +34,7 @@ module fw_mistuning_parts
       procedure :: deviates
    end type mistuning_parts
 
-   character(*), parameter :: of_sector = 'mistuning/sector/M'
+   character(*), parameter :: of_sector = 'mistuning/sector/J'
 
 contains
 
@@ -72,7 +72,7 @@ contains
          to%number = numbers(i)
          if (.not. allocated(self%sector)) allocate (self%sector(max(1, n_sectors)))
          associate (own => self%sector(numbers(i) + 1))
-            call to%bind(part(of_sector//'/stiffness', square, 'of sector M from 0, symmetric'), &
+            call to%bind(part(of_sector//'/stiffness', square, 'of sector J from 0, symmetric'), &
                          own%stiffness)
             call to%bind(part(of_sector//'/mass', square, 'likewise'), own%mass)
             call to%bind(part(of_sector//'/damping', square, 'likewise'), own%damping)

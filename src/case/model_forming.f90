@@ -7,6 +7,7 @@ module fw_model_forming
    use fw_kinds, only: pi, wp
    use fw_model, only: matrix_change, model_type
    use fw_raw_model, only: raw_model
+   use fw_speed_growth, only: even_powers, slopes_of_powers, speed_growth
    use fw_model_keys, only: model_options
    use fw_parameters, only: is_of_matrices, loss_factor, modal_damping, rayleigh_mass, &
       rayleigh_stiffness, rotation_speed
@@ -60,7 +61,7 @@ contains
       model%load_static = raw%load_static + static
       ! Rotation comes before damping, which takes the stiffness at speed, and before the static
       ! scale, which multiplies the load of the rotation too.
-      call add_rotation(options%rotation_speed, raw, model)
+      call add_rotation(options%rotation_speed, raw%growth, model)
       model%load_static = options%static_scale*model%load_static
       if (allocated(raw%damping)) then
          model%damping = raw%damping
@@ -70,7 +71,7 @@ contains
       end if
       model%damping = model%damping + options%rayleigh_mass*model%mass &
                       + options%rayleigh_stiffness*model%stiffness
-      model%rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)
+      model%rotates = raw%growth%exists()
       model%turns = model%rotates .or. allocated(raw%coriolis) .or. &
                     allocated(raw%circulatory) .or. raw%contact%has_growth()
       ! Before the matrices below are added, which it is no part of.
@@ -164,18 +165,10 @@ contains
       speed%order = options%speed_order
       if (allocated(raw%coriolis)) speed%coriolis = raw%coriolis
       if (allocated(raw%circulatory)) speed%circulatory = raw%circulatory
-      if (allocated(raw%stiffness_rotation)) then
-         speed%stiffness = raw%stiffness_rotation
-         if (options%rayleigh_stiffness > 0.0_wp) then
-            speed%damping = options%rayleigh_stiffness*raw%stiffness_rotation
-         end if
-         if (options%loss_factor > 0.0_wp) then
-            speed%structural = options%loss_factor*raw%stiffness_rotation
-         end if
-      end if
-      if (allocated(raw%load_static_rotation)) then
-         speed%load = options%static_scale*raw%load_static_rotation
-      end if
+      speed%growth = raw%growth
+      if (allocated(raw%growth%load)) speed%growth%load = options%static_scale*raw%growth%load
+      speed%rayleigh = options%rayleigh_stiffness
+      speed%loss = options%loss_factor
       model%cyclic%speed = speed
    end subroutine follow_speed
 
@@ -200,19 +193,17 @@ contains
       call find_changes(options, raw, wanted, model, error)
    end subroutine finish_structure
 
-   !> Centrifugal stiffness and load grow with the square of the speed.
-   subroutine add_rotation(speed, raw, model)
+   !> Centrifugal stiffness and load grow with even powers of the speed.
+   subroutine add_rotation(speed, growth, model)
       real(wp), intent(in) :: speed
-      type(raw_model), intent(in) :: raw
+      type(speed_growth), intent(in) :: growth
       type(model_type), intent(inout) :: model
 
+      if (allocated(growth%load_at_rest)) model%load_static = model%load_static + &
+                                                              growth%load_at_rest
       if (speed <= 0.0_wp) return
-      if (allocated(raw%stiffness_rotation)) then
-         model%stiffness = model%stiffness + speed**2*raw%stiffness_rotation
-      end if
-      if (allocated(raw%load_static_rotation)) then
-         model%load_static = model%load_static + speed**2*raw%load_static_rotation
-      end if
+      call growth%add_stiffness(even_powers(speed, growth%n_powers()), model%stiffness)
+      call growth%add_load(even_powers(speed, growth%n_powers()), model%load_static)
    end subroutine add_rotation
 
    !> The changes by those of the wanted parameters that change matrices.
@@ -279,25 +270,26 @@ contains
       type(model_type), intent(in) :: model
       type(matrix_change), intent(inout) :: change
       type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: slopes(:)
 
       associate (speed => options%rotation_speed)
-         if (allocated(raw%load_static_rotation)) then
-            change%load_static = options%static_scale*2.0_wp*speed*raw%load_static_rotation
-         end if
-         if (.not. allocated(raw%stiffness_rotation)) return
-         change%stiffness = 2.0_wp*speed*raw%stiffness_rotation
+         slopes = slopes_of_powers(speed, raw%growth%n_powers())
+         call raw%growth%add_load(slopes, change%load_static)
+         change%load_static = options%static_scale*change%load_static
+         if (.not. allocated(raw%growth%stiffness)) return
+         call raw%growth%add_stiffness(slopes, change%stiffness)
          change%damping = options%rayleigh_stiffness*change%stiffness
          if (options%modal_damping > 0.0_wp .and. speed > 0.0_wp) then
-            call change_modal_damping(options, raw%stiffness_rotation, model, change%damping, error)
+            call change_modal_damping(options, raw%growth, model, change%damping, error)
          end if
       end associate
    end subroutine change_by_speed
 
    !> Modes turn with the stiffness: a difference of the square root that modal damping is.
-   subroutine change_modal_damping(options, rotation, model, damping, error)
+   subroutine change_modal_damping(options, growth, model, damping, error)
       type(model_options), intent(in) :: options
-      !> Stiffness per square of the speed.
-      real(wp), intent(in) :: rotation(:, :)
+      !> What the stiffness has by the speed.
+      type(speed_growth), intent(in) :: growth
       type(model_type), intent(in) :: model
       !> Grows by the derivative.
       real(wp), intent(inout) :: damping(:, :)
@@ -306,12 +298,15 @@ contains
       real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp]/12.0_wp
       real(wp), allocatable :: stiffness(:, :)
       real(wp) :: h, speed
-      integer :: k
+      integer :: k, n
 
       h = step*options%rotation_speed
+      n = growth%n_powers()
       do k = 1, size(place)
          speed = options%rotation_speed + place(k)*h
-         stiffness = model%stiffness + (speed**2 - options%rotation_speed**2)*rotation
+         stiffness = model%stiffness
+         call growth%add_stiffness(even_powers(speed, n) - even_powers(options%rotation_speed, n), &
+                                   stiffness)
          call add_modal_damping(model%mass, stiffness, weight(k)/h*options%modal_damping, damping, &
                                 error, 2.0_wp*pi*options%modal_damping_up_to)
          if (allocated(error)) return

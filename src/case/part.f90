@@ -146,7 +146,9 @@ contains
       integer :: at
 
       name = part%name
-      at = max(index(part%name, '/K'), index(part%name, '/M'))
+      ! Places of numbers are the only capital letters.
+      at = max(index(part%name, '/K'), index(part%name, '/M'), index(part%name, '/I'), &
+               index(part%name, '/J'))
       if (at > 0) name = part%name(:at)//to_text(self%number)//part%name(at + 2:)
    end function name_of
 

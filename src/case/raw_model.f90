@@ -9,6 +9,8 @@ module fw_raw_model
    use fw_law_text, only: all_laws
    use fw_laws, only: law_words
    use fw_mistuning_parts, only: mistuning_parts
+   use fw_speed_growth, only: speed_growth
+   use fw_speed_parts, only: speed_parts
    use fw_stress_parts, only: stress_parts
    use fw_normal_law, only: normal_words
    use fw_part_keys, only: part_keys
@@ -55,6 +57,10 @@ module fw_raw_model
       real(wp), allocatable :: reduction_frequency(:), reduction_error(:)
       !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
       real(wp), allocatable :: coriolis(:, :)
+      !> Matrices at several speeds in place of those, and what grows with the speed by either
+      !> (`find_growth`).
+      type(speed_parts) :: speeds
+      type(speed_growth) :: growth
       type(stress_parts) :: stress
       !> How sectors differ from the tuned one.
       type(mistuning_parts), allocatable :: mistuning
@@ -68,10 +74,11 @@ module fw_raw_model
    contains
       procedure :: order
       procedure :: bind_parts
+      procedure :: find_growth
    end type raw_model
 
    character(*), parameter :: always = 'required', with_pairs = 'with /contact', &
-      with_springs = 'with /spring', with_mesh = 'with /mesh'
+      with_springs = 'with /spring', with_mesh = 'with /mesh', without_speeds = 'without /speed'
 
 contains
 
@@ -90,6 +97,7 @@ contains
       class(part_source), intent(inout) :: to
 
       call bind_structure(self, to)
+      call self%speeds%bind_parts(to)
       call bind_pairs(self%contact, to)
       call bind_springs(self%springs, to)
       call bind_elements(self%elements, to)
@@ -102,6 +110,35 @@ contains
       call self%stress%bind_parts(to)
       call note_mesh(to)
    end subroutine bind_parts
+
+   !> What grows with the rotation speed, from matrices per square of it or from those at several
+   !> speeds; a message where these do not fit. Once, when all parts are there.
+   subroutine find_growth(self, message)
+      class(raw_model), intent(inout) :: self
+      character(:), allocatable, intent(out) :: message
+
+      if (allocated(self%speeds%value) .or. allocated(self%speeds%at)) then
+         if (allocated(self%stiffness_rotation) .or. allocated(self%load_static_rotation)) then
+            message = 'speed/value beside stiffness_rotation or load/static_rotation: must be '// &
+                      'one of both'
+         else if (allocated(self%cyclic%nodal)) then
+            message = 'speed/value beside matrices of nodal diameters: give these at one speed'
+         else
+            call self%speeds%interpolate(self%stiffness, self%growth, message)
+         end if
+         return
+      end if
+      if (allocated(self%cyclic%nodal)) return
+      if (allocated(self%stiffness_rotation)) then
+         self%growth%stiffness = reshape(self%stiffness_rotation, &
+                                         [shape(self%stiffness_rotation), 1])
+         deallocate (self%stiffness_rotation)
+      end if
+      if (allocated(self%load_static_rotation)) then
+         self%growth%load = reshape(self%load_static_rotation, &
+                                    [size(self%load_static_rotation), 1])
+      end if
+   end subroutine find_growth
 
    !> Format, title and units, then the matrices.
    subroutine bind_structure(self, to)
@@ -117,7 +154,8 @@ contains
       call to%note('text', part('@disk_parameters', '', 'what python -m fretwear.disk made '// &
                                 'it from'))
       call to%bind(part('mass', 'dof dof', 'symmetric', always, either_way), self%mass)
-      call to%bind(part('stiffness', 'dof dof', 'symmetric', always, either_way), self%stiffness)
+      call to%bind(part('stiffness', 'dof dof', 'symmetric', without_speeds, either_way), &
+                   self%stiffness)
       call to%bind(part('damping', 'dof dof', 'viscous, symmetric', storage=either_way), &
                    self%damping)
       call to%bind(part('stiffness_rotation', 'dof dof', 'added to the stiffness for each '// &

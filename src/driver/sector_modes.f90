@@ -118,7 +118,10 @@ contains
       call wave_of(nodal, nodal%stiffness, conjugated, wave)
       if (allocated(case%model%cyclic%speed)) then
          call speed_at(case%model, abs(case%model%cyclic%nodal_diameter(harmonic)), speed)
-         call follow_speed(speed, harmonic, conjugated, wave)
+         ! Of a range without end the speeds that the matrices are known at.
+         call follow_speed(speed, harmonic, conjugated, &
+                           min(0.5_wp*sum(range), harmonic*speed%order* &
+                               case%model%cyclic%speed%growth%highest), wave)
       end if
       call find_whirl(wave, root, right, left)
       load = load_in(nodal, harmonic, conjugated, 0.5_wp*sum(range))
@@ -145,21 +148,35 @@ contains
    end subroutine find_waves
 
    !> Critical speeds: with lambda = i n omega and Omega = omega/p the forces of the speed are some
-   !> of lambda and of its square.
-   pure subroutine follow_speed(speed, harmonic, conjugated, wave)
+   !> of lambda and of its square. Higher powers of Omega are replaced by the tangent in Omega**2 at
+   !> the middle of the range, to which roots are near.
+   pure subroutine follow_speed(speed, harmonic, conjugated, middle, wave)
       type(nodal_speed), intent(in) :: speed
       integer, intent(in) :: harmonic
       !> Whether the wave runs the other way than the matrices.
       logical, intent(in) :: conjugated
+      !> Frequency of the harmonic [rad/s].
+      real(wp), intent(in) :: middle
       type(wave_matrices), intent(inout) :: wave
       complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
-      real(wp) :: np
+      complex(wp), allocatable :: level(:, :), slope(:, :)
+      real(wp) :: np, x
+      integer :: p
 
       np = harmonic*speed%order
       call add_multiple(speed%coriolis, -i/np, conjugated, wave%mass)
       call add_multiple(speed%circulatory, -i/np, conjugated, wave%damping)
-      call add_multiple(speed%stiffness, cmplx(-1.0_wp/np**2, kind=wp), conjugated, wave%mass)
-      call add_multiple(speed%structural, -i/np**2, conjugated, wave%mass)
+      if (speed%n_powers() == 0) return
+      x = (middle/np)**2
+      allocate (level, slope, mold=wave%mass)
+      level = (0.0_wp, 0.0_wp)
+      slope = (0.0_wp, 0.0_wp)
+      do p = 1, speed%n_powers()
+         slope = slope + p*x**(p - 1)*speed%stiffness(:, :, p)
+         if (p > 1) level = level + (1 - p)*x**p*speed%stiffness(:, :, p)
+      end do
+      call add_multiple(slope, -(1.0_wp + i*speed%loss)/np**2, conjugated, wave%mass)
+      call add_multiple(level, 1.0_wp + i*speed%loss, conjugated, wave%stiffness)
    end subroutine follow_speed
 
    !> Linear springs, and what the contact holds.

@@ -234,7 +234,9 @@ contains
          end if
          if (.not. allocated(parts%cyclic%nodal)) then
             if (.not. allocated(parts%mass)) missing = 'mass'
-            if (.not. allocated(parts%stiffness)) missing = 'stiffness'
+            if (.not. (allocated(parts%stiffness) .or. allocated(parts%speeds%at))) then
+               missing = 'stiffness'
+            end if
          end if
       end associate
       associate (contact => self%parts%contact)

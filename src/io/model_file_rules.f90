@@ -85,6 +85,7 @@ contains
       logical, intent(out) :: conjugates
       type(error_type), allocatable, intent(out) :: error
       character(*), parameter :: others(*) = [character(22) :: '/mass', '/stiffness', '/damping', &
+         '/speed', &
          '/stiffness_rotation', '/coriolis', '/structural_damping', '/circulatory', &
          '/stiffness_unsymmetric', '/damping_unsymmetric', '/cyclic/left', '/cyclic/right']
       character(:), allocatable :: phase

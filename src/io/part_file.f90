@@ -97,6 +97,8 @@ contains
 
       is_needed = part%needed == 'required' .or. part%needed == 'with its group'
       if (index(part%needed, 'with /') == 1) is_needed = self%file%exists(trim(part%needed(6:)))
+      if (index(part%needed, 'without /') == 1) is_needed = .not. &
+         self%file%exists(trim(part%needed(9:)))
    end function is_needed
 
    !> Numbers of any rank, or the one that holds for all.

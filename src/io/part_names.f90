@@ -101,7 +101,7 @@ contains
    pure logical function is_number(known)
       character(*), intent(in) :: known
 
-      is_number = known == 'K' .or. known == 'M'
+      is_number = index('KMIJ', trim(known)) > 0 .and. len_trim(known) == 1
    end function is_number
 
    !> ` (did you mean contact/mu?)`, or nothing, of the parts that a calling program gives.

@@ -127,7 +127,7 @@ contains
       logical :: ok
 
       allocate (list(0))
-      n = scan(part%name, 'KM') - 1
+      n = scan(part%name, 'KMIJ') - 1
       if (allocated(self%error) .or. index(self%name, part%name(:n)) /= 1) return
       rest = self%name(n + 1:index(self%name(n + 1:)//'/', '/') + n - 1)
       call read_integer(rest, k, ok)

@@ -309,12 +309,24 @@ contains
    subroutine check_order(reader, case)
       type(reader_type), intent(inout) :: reader
       type(case_type), intent(in) :: case
-      real(wp) :: order
+      real(wp), parameter :: round_off = 1.0e-12_wp
+      real(wp) :: order, speeds(2)
 
       order = 0.0_wp
       if (allocated(case%model%cyclic%speed)) order = case%model%cyclic%speed%order
-      if (abs(order - case%sweep%speed_order) > 0.0_wp) call reader%refuse('sweep', 'speed_order', &
-         'must be a plain number')
+      if (abs(order - case%sweep%speed_order) > 0.0_wp) then
+         call reader%refuse('sweep', 'speed_order', 'must be a plain number')
+      else if (order > 0.0_wp) then
+         speeds = case%sweep%range()/order
+         associate (growth => case%model%cyclic%speed%growth)
+            if (speeds(1) < (1.0_wp - round_off)*growth%lowest .or. &
+                speeds(2) > (1.0_wp + round_off)*growth%highest) call reader%refuse( &
+               'sweep', 'speed_order', 'asks for speeds from '//to_text(speeds(1))//' to '// &
+               to_text(speeds(2))//' rad/s: the model is known from '// &
+               to_text(growth%lowest)//' to '//to_text(growth%highest)// &
+               ' rad/s (speed/value): sweep over these times speed_order')
+         end associate
+      end if
    end subroutine check_order
 
    !> Matrices that change from point to point: what they are formed from is kept, and the values

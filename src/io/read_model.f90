@@ -50,6 +50,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> What the calling program hands over, with mass and stiffness.
       type(raw_model), intent(in), optional :: memory_model
+      character(:), allocatable :: message
       logical :: is_inline, is_file
 
       call choose_source(reader, present(memory_model), options)
@@ -60,12 +61,13 @@ contains
       if (present(memory_model)) then
          raw = memory_model
          reader%in_memory = .true.
-         n_dof = raw%order()
       else if (is_file .and. allocated(options%file)) then
          call read_file(reader, directory, options, raw, error)
          if (allocated(error)) return
-         n_dof = raw%order()
       end if
+      call raw%find_growth(message)
+      if (allocated(message)) call reader%refuse_model(message)
+      n_dof = raw%order()
       if (allocated(options%file) .and. .not. is_file) then
          call reader%refuse('model', 'file', "is given, but source = '"// &
                             trim(source_words(options%source))//"': give source = "// &
@@ -326,7 +328,7 @@ contains
       if (reader%failed()) return
       model%load_cosine = options%harmonic_scale*raw%load_cosine
       model%load_sine = options%harmonic_scale*raw%load_sine
-      call check_rotation(reader, options%rotation_speed, raw)
+      call check_rotation(reader, options%rotation_speed, options%speed_order, raw)
       if (allocated(origin)) then
          origin%options = options
          origin%raw = raw
@@ -342,17 +344,26 @@ contains
       if (size(wanted) == 0 .and. .not. allocated(origin)) then
          deallocate (raw%mass, raw%stiffness)
          if (allocated(raw%damping)) deallocate (raw%damping)
-         if (allocated(raw%stiffness_rotation)) deallocate (raw%stiffness_rotation)
+         if (allocated(raw%growth%stiffness)) deallocate (raw%growth%stiffness)
       end if
       call finish_structure(options, raw, wanted, model, error)
    end subroutine finish_model
 
-   !> A speed that nothing depends on.
-   subroutine check_rotation(reader, speed, raw)
+   !> A speed that nothing depends on, or at which the model is not known.
+   subroutine check_rotation(reader, speed, order, raw)
       type(reader_type), intent(inout) :: reader
-      real(wp), intent(in) :: speed
+      !> Order: of a speed that follows the frequency, else 0.
+      real(wp), intent(in) :: speed, order
       type(raw_model), intent(in) :: raw
 
+      if (order <= 0.0_wp .and. (speed < raw%growth%lowest .or. &
+                                 speed > raw%growth%highest)) then
+         call reader%refuse('model', 'rotation_speed', '= '//to_text(speed)//': the model is '// &
+                            'known at speeds (speed/value) from '// &
+                            to_text(raw%growth%lowest)//' to '//to_text(raw%growth%highest)// &
+                            ' rad/s: must be one of these')
+         return
+      end if
       if (speed <= 0.0_wp .or. rotates(raw)) return
       call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
                          'stiffness_rotation, no coriolis, no circulatory, no load '// &
@@ -374,14 +385,12 @@ contains
       else if (model%cyclic%has_nodal()) then
          reason = 'does not go with matrices of nodal diameters: give model%rotation_speed, '// &
                   'speed by speed'
-      else if (model%cyclic%is_mistuned) then
-         reason = 'does not go with cyclic%mistuned: give model%rotation_speed, speed by speed'
       else if (.not. rotates(raw)) then
          reason = 'is given, but nothing of the model depends on the rotation speed '// &
                   '(stiffness_rotation, coriolis, circulatory, load static_rotation, contact '// &
                   'gap_rotation, normal_load_rotation): remove it'
       else if (options%modal_damping > 0.0_wp .and. (model%cyclic%has_sectors() &
-               .or. allocated(raw%stiffness_rotation))) then
+               .or. allocated(raw%growth%stiffness))) then
          reason = 'does not go with model%modal_damping, whose modes would change with '// &
                   'the speed: give damping, or rayleigh_stiffness'
       end if
@@ -392,7 +401,7 @@ contains
    pure logical function rotates(raw)
       type(raw_model), intent(in) :: raw
 
-      rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation) .or. &
+      rotates = raw%growth%exists() .or. allocated(raw%load_static_rotation) .or. &
                 allocated(raw%coriolis) .or. allocated(raw%circulatory) .or. &
                 raw%contact%has_growth()
    end function rotates
@@ -435,15 +444,24 @@ contains
       type(raw_model), intent(inout) :: raw
       logical, intent(in) :: is_inline
       character(:), allocatable :: message
-      integer :: n_dof
+      integer :: i, n_dof
 
       if (reader%failed()) return
       n_dof = size(raw%stiffness, 1)
       call check_one('mass', raw%mass)
       call check_one('stiffness', raw%stiffness)
       if (allocated(raw%damping)) call check_one('damping', raw%damping)
-      if (allocated(raw%stiffness_rotation)) then
-         call check_one('stiffness_rotation', raw%stiffness_rotation)
+      if (allocated(raw%growth%stiffness) .and. .not. allocated(raw%speeds%at)) then
+         call check_one('stiffness_rotation', raw%growth%stiffness(:, :, 1))
+      end if
+      if (allocated(raw%speeds%at)) then
+         do i = 1, size(raw%speeds%at)
+            associate (here => raw%speeds%at(i))
+               if (allocated(here%stiffness)) call check_one('speed/'//to_text(i - 1)// &
+                                                             '/stiffness', here%stiffness)
+            end associate
+         end do
+         deallocate (raw%speeds%at)
       end if
       if (allocated(raw%structural_damping)) then
          call check_one('structural_damping', raw%structural_damping)
@@ -451,10 +469,11 @@ contains
       call check_any('circulatory', raw%circulatory)
       call check_any('stiffness_unsymmetric', raw%stiffness_unsymmetric)
       call check_any('damping_unsymmetric', raw%damping_unsymmetric)
-      if (.not. allocated(raw%load_static_rotation)) return
-      call check_vector(raw%load_static_rotation, n_dof, message)
+      if (.not. allocated(raw%growth%load)) return
+      call check_vector(raw%growth%load(:, 1), n_dof, message)
       if (allocated(message)) then
-         call reader%refuse_model('a load static_rotation that '//message)
+         call reader%refuse_model('a load '//trim(merge('speed/I/static ', 'static_rotation', &
+                                  allocated(raw%speeds%value)))//' that '//message)
       end if
 
    contains

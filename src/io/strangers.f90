@@ -8,6 +8,7 @@ module fw_strangers
    use fw_hdf5_members, only: kind_of, list_attributes, list_members
    use fw_part_names, only: hint_for, is_number
    use fw_parts, only: model_parts, part_type
+   use fw_speed_parts, only: most_speeds
    use fw_text, only: lower_case, string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
@@ -243,14 +244,19 @@ contains
    end function is_meant
 
    !> First and last number that a name of the table stands for. Nodal diameters above N/2 are the
-   !> conjugates of others: what a file says of them would not count.
+   !> conjugates of others: what a file says of them would not count. J: sectors, I: speeds.
    pure function numbers(self, known) result(range)
       class(search_type), intent(in) :: self
       character(*), intent(in) :: known
       integer :: range(2)
 
       range = [1 - self%n_sectors, self%n_sectors - 1]
-      if (known == 'K') range = [0, self%n_sectors/2]
+      select case (known)
+      case ('K'); range = [0, self%n_sectors/2]
+      case ('J'); range = [0, self%n_sectors - 1]
+      case ('I'); range = [0, most_speeds - 1]
+      case default ! sectors before and behind another
+      end select
    end function numbers
 
    !> A name of the table as messages have it.

@@ -21,7 +21,7 @@ module fw_all_sectors
    use fw_ring_fft, only: ring_fft
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
-   use fw_sector_uncondensed, only: add_uncondensed
+   use fw_sector_uncondensed, only: add_speed_slope, add_uncondensed
    use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, slopes_of
    use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_operator, &
       structure_state
@@ -232,7 +232,7 @@ contains
             state%point(:, h)%theta = cmplx((self%harmonic(h)*omega)**2, &
                                             self%harmonic(h)*omega*self_excitation, wp)
          end do
-         if (self%n_coordinates > 0) call form_all(self, state, n_failed)
+         if (self%n_coordinates > 0) call form_all(self, state, omega, n_failed)
          call state%scale_loads()
       end select
       if (n_failed > 0) then
@@ -246,16 +246,18 @@ contains
    end subroutine at
 
    !> Z_n,k of every harmonic and nodal diameter; how many could not be condensed.
-   subroutine form_all(self, state, n_failed)
+   subroutine form_all(self, state, omega, n_failed)
       class(all_sectors), intent(in) :: self
       type(all_sectors_state), intent(inout) :: state
+      real(wp), intent(in) :: omega
       integer, intent(inout) :: n_failed
       complex(wp), allocatable :: load(:), loads(:, :)
       integer :: h, k, task
       logical :: failed
 
       allocate (load(self%n_slots), loads(self%n_slots, size(self%harmonic)))
-      !$omp parallel do default(none) shared(self, state, loads) private(h, k, task, failed) &
+      !$omp parallel do default(none) shared(self, state, omega, loads) &
+      !$omp private(h, k, task, failed) &
       !$omp firstprivate(load) reduction(+:n_failed) schedule(dynamic) &
       !$omp if(self%n_coordinates >= coordinates_for_threads)
       do task = 0, size(self%harmonic)*self%n_alike - 1
@@ -264,8 +266,8 @@ contains
          if (is_mirrored(self, k, state%point(k + 1, h))) cycle
          call form_sector(self%basis(basis_of(self, k)), state%point(k + 1, h), &
                           state%wave(:, :, k + 1, h), load, failed)
-         if (self%harmonic(h) == 0) call add_uncondensed(self%basis(basis_of(self, k)), 0, 2*k > &
-            self%n_alike, 0.0_wp, state%wave(:, :, k + 1, h), load)
+         call add_uncondensed(self%basis(basis_of(self, k)), self%harmonic(h), &
+                              2*k > self%n_alike, omega, state%wave(:, :, k + 1, h), load)
          if (failed) n_failed = n_failed + 1
          if (state%point(k + 1, h)%is_loaded) loads(:, h) = load
       end do
@@ -298,6 +300,10 @@ contains
 
       is_mirrored = 2*k > self%n_alike .and. .not. point%is_loaded .and. &
                     .not. self%basis(basis_of(self, k))%has_whirl()
+      associate (basis => self%basis(basis_of(self, k)))
+         if (allocated(basis%speed)) is_mirrored = is_mirrored .and. .not. &
+            (allocated(basis%speed%coriolis) .or. allocated(basis%speed%circulatory))
+      end associate
    end function is_mirrored
 
    !> The basis of nodal diameter k = 0 .. N - 1.
@@ -488,6 +494,10 @@ contains
                   call derive_sector(self%basis(basis_of(self, k)), point, &
                                      slopes_of(point, state%self_excitation, parameter), &
                                      state%load_factor(h), waves(:, k + 1), slopes(:, k + 1))
+                  if (parameter == by_frequency) call add_speed_slope( &
+                     self%basis(basis_of(self, k)), self%harmonic(h), 2*k > self%n_alike, &
+                     state%omega, merge(state%load_factor(h), 0.0_wp, point%is_loaded), &
+                     waves(:, k + 1), slopes(:, k + 1))
                end associate
             end do
             call self%ring%add_waves(slopes, waves)
@@ -644,6 +654,12 @@ contains
       do k = 1, size(self%basis)
          associate (b => self%basis(k)%blocks)
             largest = max(largest, abs(b(:m, :, 1)) + theta*abs(b(:m, :, 2)))
+         end associate
+         if (.not. allocated(self%basis(k)%speed)) cycle
+         associate (speed => self%basis(k)%speed)
+            do j = 1, speed%n_powers()
+               largest = largest + (state%omega/speed%order)**(2*j)*abs(speed%stiffness(:, :, j))
+            end do
          end associate
       end do
       do j = 1, self%n_alike

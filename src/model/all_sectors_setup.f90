@@ -1,8 +1,8 @@
 !> All sectors at once: bases of all nodal diameters, and the numbers of the coordinates.
 submodule(fw_all_sectors) fw_all_sectors_setup
-   use fw_cyclic_data, only: nodal_matrices
+   use fw_cyclic_data, only: nodal_matrices, nodal_speed
    use fw_ring_deviation, only: new_ring_deviation
-   use fw_sector, only: sector_at
+   use fw_sector, only: sector_at, speed_at
    implicit none (type, external)
 
 contains
@@ -20,7 +20,8 @@ contains
       self%n_observed = self%n_alike*size(model%observe_matrix, 1)
       call find_bases(model, relative, omega_range, keeps_all, self, error)
       if (allocated(error)) return
-      call find_norms(self)
+      ! With a speed that follows the frequency they would be those of one.
+      if (.not. allocated(model%cyclic%speed)) call find_norms(self)
       if (present(tuned)) then
          ! The stiffness of rigid laws is that of the tuned disk, whose rows nothing holds.
          call self%means%take(model, tuned, means, [sector_reduction ::], error)
@@ -61,6 +62,8 @@ contains
       type(all_sectors), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices), allocatable :: nodal(:)
+      type(nodal_speed) :: speed
+      integer, allocatable :: slot(:)
       integer :: i, k, n, n_kept
 
       n = self%n_alike/2
@@ -69,6 +72,11 @@ contains
       do k = 0, n
          call require_diameter(model, k, error)
          if (.not. allocated(error)) call sector_at(model, k, nodal(k + 1), error)
+         if (allocated(model%cyclic%speed) .and. .not. allocated(error)) then
+            call self%basis(k + 1)%keep_dofs(k, size(nodal(k + 1)%mass, 1), relative%at(k + 1))
+            n_kept = max(n_kept, size(self%basis(k + 1)%kept))
+            cycle
+         end if
          if (.not. allocated(error)) then
             call self%basis(k + 1)%find_modes(k, nodal(k + 1), relative%at(k + 1), error)
          end if
@@ -89,9 +97,13 @@ contains
       end do
       call number_coordinates(relative%n_coordinates, n_kept, self)
       do k = 0, n
-         call self%basis(k + 1)%transform( &
-            nodal(k + 1), [relative%slots(k), (relative%n_coordinates + i, &
-                                               i=1, size(self%basis(k + 1)%kept))], self%n_slots)
+         slot = [relative%slots(k), (relative%n_coordinates + i, &
+                                     i=1, size(self%basis(k + 1)%kept))]
+         if (allocated(model%cyclic%speed)) then
+            call speed_at(model, k, speed)
+            call self%basis(k + 1)%take_speed(speed, self%n_slots, slot)
+         end if
+         call self%basis(k + 1)%transform(nodal(k + 1), slot, self%n_slots)
       end do
    end subroutine find_bases
 

@@ -7,6 +7,7 @@ module fw_cyclic_data
    use fw_deviation, only: deviation_type
    use fw_kinds, only: pi, wp
    use fw_load_waves, only: load_waves
+   use fw_speed_growth, only: speed_growth
    implicit none (type, external)
    private
 
@@ -55,26 +56,27 @@ module fw_cyclic_data
    end type influence_type
 
    !> What a rotation speed Omega that follows the frequency adds to the matrices and to the static
-   !> load: Omega (G u' + R u) + Omega**2 (K_r u - f_r), with the damping that follows K_r.
+   !> load: Omega (G u' + R u) + Omega**2 (K_r u - f_r), and likewise higher even powers, with the
+   !> damping that follows K_r.
    type :: speed_matrices
       !> Frequency over speed; 0: the speed does not follow.
       real(wp) :: order = 0.0_wp
       !> G and R (n_dof, n_dof).
       real(wp), allocatable :: coriolis(:, :), circulatory(:, :)
-      !> K_r, the damping in proportion to it, and its hysteretic damping (n_dof, n_dof).
-      real(wp), allocatable :: stiffness(:, :), damping(:, :), structural(:, :)
-      !> f_r (n_dof).
-      real(wp), allocatable :: load(:)
+      !> K_r and f_r.
+      type(speed_growth) :: growth
+      !> Damping in proportion to K_r [s], and its loss factor.
+      real(wp) :: rayleigh = 0.0_wp, loss = 0.0_wp
    end type speed_matrices
 
-   !> The same of a tied sector in a nodal diameter 0 .. N/2 (n, n), (n): the load acts in
-   !> harmonic 0 alone.
+   !> The same of a tied sector in a nodal diameter 0 .. N/2 (n, n), with powers of the stiffness
+   !> (n, n, n_powers) and of the load (n, n_powers), which acts in harmonic 0 alone.
    type :: nodal_speed
-      real(wp) :: order = 0.0_wp
-      complex(wp), allocatable :: coriolis(:, :), circulatory(:, :), stiffness(:, :), &
-         damping(:, :), structural(:, :)
-      complex(wp), allocatable :: load(:)
+      real(wp) :: order = 0.0_wp, rayleigh = 0.0_wp, loss = 0.0_wp
+      complex(wp), allocatable :: coriolis(:, :), circulatory(:, :), stiffness(:, :, :)
+      complex(wp), allocatable :: load(:, :)
    contains
+      procedure :: n_powers
       procedure :: in_basis
    end type nodal_speed
 
@@ -198,18 +200,33 @@ contains
       has_whirl = allocated(self%coriolis) .or. allocated(self%aero)
    end function has_whirl
 
+   !> Powers of the stiffness.
+   pure integer function n_powers(self)
+      class(nodal_speed), intent(in) :: self
+
+      n_powers = 0
+      if (allocated(self%stiffness)) n_powers = size(self%stiffness, 3)
+   end function n_powers
+
    !> The coordinates of u = T q.
    pure function in_basis(self, t) result(reduced)
       class(nodal_speed), intent(in) :: self
       complex(wp), intent(in) :: t(:, :)
       type(nodal_speed) :: reduced
+      integer :: p
 
       reduced%order = self%order
+      reduced%rayleigh = self%rayleigh
+      reduced%loss = self%loss
       call take(self%coriolis, reduced%coriolis)
       call take(self%circulatory, reduced%circulatory)
-      call take(self%stiffness, reduced%stiffness)
-      call take(self%damping, reduced%damping)
-      call take(self%structural, reduced%structural)
+      if (allocated(self%stiffness)) then
+         allocate (reduced%stiffness(size(t, 2), size(t, 2), size(self%stiffness, 3)))
+         do p = 1, size(self%stiffness, 3)
+            reduced%stiffness(:, :, p) = matmul(conjg(transpose(t)), &
+                                                matmul(self%stiffness(:, :, p), t))
+         end do
+      end if
       if (allocated(self%load)) reduced%load = matmul(conjg(transpose(t)), self%load)
 
    contains

@@ -467,10 +467,9 @@ contains
                                slopes_of(state%point(h), state%self_excitation, parameter), &
                                state%load_factor(h), amplitude(:, h), slopes(:, h))
             if (parameter /= by_frequency) cycle
-            if (allocated(self%basis(self%basis_of(h))%speed)) call add_speed_slope( &
-               self%basis(self%basis_of(h))%speed, self%harmonic(h), self%conjugated(h), &
-               state%omega, &
-               state%load_factor(h), amplitude(:, h), slopes(:, h))
+            call add_speed_slope(self%basis(self%basis_of(h)), self%harmonic(h), &
+                                 self%conjugated(h), state%omega, state%load_factor(h), &
+                                 amplitude(:, h), slopes(:, h))
          end do
       end select
       call coefficients_of(self%harmonic, self%column, m, m, slopes, slope)
@@ -583,8 +582,10 @@ contains
       end associate
       associate (b => self%basis(self%basis_of(h)))
          if (.not. allocated(b%speed)) return
-         if (allocated(b%speed%stiffness)) sums = sums + (state%omega/b%speed%order)**2* &
-            matmul(abs(b%speed%stiffness), amplitude(:m))
+         do j = 1, b%speed%n_powers()
+            sums = sums + (state%omega/b%speed%order)**(2*j)* &
+                   matmul(abs(b%speed%stiffness(:, :, j)), amplitude(:m))
+         end do
       end associate
    end subroutine magnitudes
 

@@ -4,6 +4,7 @@ module fw_model
    use fw_cyclic_data, only: cyclic_type
    use fw_kinds, only: wp
    use fw_load_waves, only: load_waves
+   use fw_speed_growth, only: even_powers
    use fw_text, only: string_type
    implicit none (type, external)
    private
@@ -79,16 +80,21 @@ contains
       class(model_type), intent(in) :: self
       real(wp), intent(in) :: omega
       type(model_type) :: model
+      real(wp), allocatable :: grown(:, :)
       real(wp) :: rate
 
       model = self
       if (.not. allocated(self%cyclic%speed)) return
       associate (speed => self%cyclic%speed)
          rate = omega/speed%order
-         if (allocated(speed%stiffness)) model%stiffness = model%stiffness + rate**2*speed%stiffness
-         if (allocated(speed%damping)) model%damping = model%damping + rate**2*speed%damping
+         if (allocated(speed%growth%stiffness)) then
+            grown = 0.0_wp*model%stiffness
+            call speed%growth%add_stiffness(even_powers(rate, speed%growth%n_powers()), grown)
+            model%stiffness = model%stiffness + grown
+            if (speed%rayleigh > 0.0_wp) model%damping = model%damping + speed%rayleigh*grown
+            if (speed%loss > 0.0_wp) call add(grown, speed%loss, model%cyclic%structural)
+         end if
          call add(speed%coriolis, rate, model%cyclic%coriolis)
-         call add(speed%structural, rate**2, model%cyclic%structural)
          if (.not. allocated(speed%circulatory)) return
          model%stiffness = model%stiffness + 0.5_wp*rate* &
                            (speed%circulatory + transpose(speed%circulatory))

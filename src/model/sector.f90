@@ -61,21 +61,27 @@ contains
       integer, intent(in) :: k
       type(nodal_speed), intent(out) :: nodal
       complex(wp) :: turn(model%n_dof)
-      integer :: i, place(model%n_dof), n
+      integer :: i, place(model%n_dof), n, p
 
       call tie_sector(model, k, place, turn, n)
       associate (speed => model%cyclic%speed)
          nodal%order = speed%order
+         nodal%rayleigh = speed%rayleigh
+         nodal%loss = speed%loss
          if (allocated(speed%coriolis)) nodal%coriolis = tied(speed%coriolis, place, turn, n)
          if (allocated(speed%circulatory)) nodal%circulatory = tied(speed%circulatory, place, &
                                                                     turn, n)
-         if (allocated(speed%stiffness)) nodal%stiffness = tied(speed%stiffness, place, turn, n)
-         if (allocated(speed%damping)) nodal%damping = tied(speed%damping, place, turn, n)
-         if (allocated(speed%structural)) nodal%structural = tied(speed%structural, place, turn, n)
-         if (.not. allocated(speed%load)) return
-         allocate (nodal%load(n), source=(0.0_wp, 0.0_wp))
+         if (allocated(speed%growth%stiffness)) then
+            allocate (nodal%stiffness(n, n, size(speed%growth%stiffness, 3)))
+            do p = 1, size(nodal%stiffness, 3)
+               nodal%stiffness(:, :, p) = tied(speed%growth%stiffness(:, :, p), place, turn, n)
+            end do
+         end if
+         if (.not. allocated(speed%growth%load)) return
+         allocate (nodal%load(n, size(speed%growth%load, 2)), source=(0.0_wp, 0.0_wp))
          do i = 1, model%n_dof
-            nodal%load(place(i)) = nodal%load(place(i)) + conjg(turn(i))*speed%load(i)
+            nodal%load(place(i), :) = nodal%load(place(i), :) + conjg(turn(i))* &
+                                      speed%growth%load(i, :)
          end do
       end associate
    end subroutine speed_at

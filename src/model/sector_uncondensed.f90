@@ -5,10 +5,11 @@ module fw_sector_uncondensed
    use fw_cyclic_data, only: nodal_speed
    use fw_kinds, only: wp
    use fw_sector_reduction, only: sector_reduction
+   use fw_speed_growth, only: even_powers, slopes_of_powers
    implicit none (type, external)
    private
 
-   public :: add_uncondensed, add_speed_slope, add_multiple
+   public :: add_uncondensed, add_speed_slope, add_multiple, add_speed_loss
 
 contains
 
@@ -40,18 +41,15 @@ contains
       s = harmonic*omega
       call add_multiple(speed%coriolis, cmplx(0.0_wp, rate*s, wp), conjugated, matrix)
       call add_multiple(speed%circulatory, cmplx(rate, kind=wp), conjugated, matrix)
-      call add_multiple(speed%stiffness, cmplx(rate**2, kind=wp), conjugated, matrix)
-      call add_multiple(speed%damping, cmplx(0.0_wp, rate**2*s, wp), conjugated, matrix)
-      if (harmonic > 0) then
-         call add_multiple(speed%structural, cmplx(0.0_wp, rate**2, wp), conjugated, matrix)
-      else if (allocated(speed%load)) then
-         load = load + rate**2*speed%load
-      end if
+      call add_stiffness(speed, even_powers(rate, speed%n_powers())*damped(speed, harmonic, s), &
+                         conjugated, matrix)
+      if (harmonic == 0 .and. allocated(speed%load)) load = load + &
+         matmul(speed%load, even_powers(rate, size(speed%load, 2)))
    end subroutine add_speed
 
-   !> The same by the frequency.
-   pure subroutine add_speed_slope(speed, harmonic, conjugated, omega, load_factor, q, derivative)
-      type(nodal_speed), intent(in) :: speed
+   !> The same by the frequency, where anything follows it.
+   pure subroutine add_speed_slope(basis, harmonic, conjugated, omega, load_factor, q, derivative)
+      type(sector_reduction), intent(in) :: basis
       integer, intent(in) :: harmonic
       logical, intent(in) :: conjugated
       real(wp), intent(in) :: omega
@@ -59,8 +57,21 @@ contains
       real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(inout) :: derivative(:)
+
+      if (allocated(basis%speed)) call add_slope(basis%speed, harmonic, conjugated, omega, &
+                                                 load_factor, q, derivative)
+   end subroutine add_speed_slope
+
+   pure subroutine add_slope(speed, harmonic, conjugated, omega, load_factor, q, derivative)
+      type(nodal_speed), intent(in) :: speed
+      integer, intent(in) :: harmonic
+      logical, intent(in) :: conjugated
+      real(wp), intent(in) :: omega, load_factor
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(inout) :: derivative(:)
       complex(wp), allocatable :: matrix(:, :)
       real(wp) :: rate, s, slope
+      integer :: n
 
       rate = omega/speed%order
       s = harmonic*omega
@@ -69,17 +80,54 @@ contains
       call add_multiple(speed%coriolis, cmplx(0.0_wp, slope*s + rate*harmonic, wp), conjugated, &
                         matrix)
       call add_multiple(speed%circulatory, cmplx(slope, kind=wp), conjugated, matrix)
-      call add_multiple(speed%stiffness, cmplx(2.0_wp*rate*slope, kind=wp), conjugated, matrix)
-      call add_multiple(speed%damping, cmplx(0.0_wp, 2.0_wp*rate*slope*s + rate**2*harmonic, wp), &
-                        conjugated, matrix)
-      if (harmonic > 0) then
-         call add_multiple(speed%structural, cmplx(0.0_wp, 2.0_wp*rate*slope, wp), conjugated, &
-                           matrix)
-      else if (allocated(speed%load)) then
-         derivative = derivative - load_factor*2.0_wp*rate*slope*speed%load
-      end if
+      n = speed%n_powers()
+      call add_stiffness(speed, slope*slopes_of_powers(rate, n)*damped(speed, harmonic, s) + &
+                         even_powers(rate, n)*cmplx(0.0_wp, harmonic*speed%rayleigh, wp), &
+                         conjugated, matrix)
+      if (harmonic == 0 .and. allocated(speed%load)) derivative = derivative - &
+         load_factor*slope*matmul(speed%load, slopes_of_powers(rate, size(speed%load, 2)))
       derivative = derivative + matmul(matrix, q)
-   end subroutine add_speed_slope
+   end subroutine add_slope
+
+   !> What the damping in proportion to the stiffness, and its loss factor, make of it.
+   pure complex(wp) function damped(speed, harmonic, s)
+      type(nodal_speed), intent(in) :: speed
+      integer, intent(in) :: harmonic
+      !> Frequency of the harmonic [rad/s].
+      real(wp), intent(in) :: s
+
+      damped = cmplx(1.0_wp, s*speed%rayleigh, wp)
+      if (harmonic > 0) damped = damped + cmplx(0.0_wp, speed%loss, wp)
+   end function damped
+
+   !> Add the hysteretic damping of what follows the frequency.
+   pure subroutine add_speed_loss(speed, conjugated, omega, matrix)
+      type(nodal_speed), intent(in) :: speed
+      logical, intent(in) :: conjugated
+      real(wp), intent(in) :: omega
+      complex(wp), intent(inout) :: matrix(:, :)
+
+      call add_stiffness(speed, cmplx(speed%loss*even_powers(omega/speed%order, &
+                                                            speed%n_powers()), kind=wp), &
+                         conjugated, matrix)
+   end subroutine add_speed_loss
+
+   !> Add factors times the powers of the stiffness.
+   pure subroutine add_stiffness(speed, factors, conjugated, sum)
+      type(nodal_speed), intent(in) :: speed
+      complex(wp), intent(in) :: factors(:)
+      logical, intent(in) :: conjugated
+      complex(wp), intent(inout) :: sum(:, :)
+      integer :: p
+
+      do p = 1, speed%n_powers()
+         if (conjugated) then
+            sum = sum + factors(p)*conjg(speed%stiffness(:, :, p))
+         else
+            sum = sum + factors(p)*speed%stiffness(:, :, p)
+         end if
+      end do
+   end subroutine add_stiffness
 
    !> sum = sum + factor matrix, of a matrix that may not be there, or its conjugate.
    pure subroutine add_multiple(matrix, factor, conjugated, sum)

@@ -3,7 +3,7 @@ module fw_sector_work
    use fw_kinds, only: pi, wp
    use fw_sector_reduction, only: sector_reduction
    use fw_sector_stiffness, only: harmonic_point, recover_sector
-   use fw_sector_uncondensed, only: add_multiple
+   use fw_sector_uncondensed, only: add_speed_loss
    implicit none (type, external)
    private
 
@@ -45,8 +45,7 @@ contains
       allocate (d(size(u), size(u)), source=(0.0_wp, 0.0_wp))
       if (allocated(basis%structural)) d = basis%structural
       if (point%conjugated) d = conjg(d)
-      if (allocated(basis%speed)) call add_multiple(basis%speed%structural, cmplx( &
-         (omega/basis%speed%order)**2, kind=wp), point%conjugated, d)
+      if (allocated(basis%speed)) call add_speed_loss(basis%speed, point%conjugated, omega, d)
       work = point%harmonic*pi*real(dot_product(u, matmul(d, u)), wp)
    end function structural_work_of
 
