@@ -234,8 +234,6 @@ contains
          asked = .not. pairs
       case ('group &base')
          asked = allocated(case%model%base_parts)
-      case ('elements beside pairs and springs')
-         asked = case%elements%n_elements() > 0
       case ('states of a law of a user')
          asked = has_states(case)
       case ("contact%memory = 'carried'")

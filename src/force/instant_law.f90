@@ -15,7 +15,7 @@ module fw_instant_law
    implicit none (type, external)
    private
 
-   public :: instant_law, element_motion, path_room, reserve_motion
+   public :: as_instant_law, instant_law, element_motion, path_room, reserve_motion
 
    !> Instants of one product: enough for the speed of dgemm, few enough for the cache.
    integer, parameter :: block = 64
@@ -105,6 +105,17 @@ module fw_instant_law
    end interface
 
 contains
+
+   !> A law that is one of these, as such; not allocated otherwise.
+   subroutine as_instant_law(law, self)
+      class(force_law), intent(in) :: law
+      class(instant_law), allocatable, intent(out) :: self
+
+      select type (law)
+      class is (instant_law)
+         allocate (self, source=law)
+      end select
+   end subroutine as_instant_law
 
    !> Elements of so many inputs each.
    pure subroutine take_inputs(self, n_in, n_elements, takes_rates)

@@ -1,6 +1,6 @@
-!> Integration over a period without contact, springs only, by CVODE (Hindmarsh et al. 2005):
-!> Adams-Moulton formulas of variable order and step to tolerances near round-off, values at
-!> uniform instants from its dense output. For structures with a regular mass whose highest
+!> Integration over a period without contact, springs and other elements, by CVODE (Hindmarsh et
+!> al. 2005): Adams-Moulton formulas of variable order and step to tolerances near round-off, values
+!> at uniform instants from its dense output. For structures with a regular mass whose highest
 !> frequency is not far above that of the load; others go through fw_time_stepper.
 module fw_smooth_integration
    use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_funloc, c_int, &
@@ -15,6 +15,7 @@ module fw_smooth_integration
    use fsundials_nvector_mod, only: fn_vdestroy, fn_vgetarraypointer, n_vector
    use fsunlinsol_dense_mod, only: fsunlinsol_dense
    use fsunmatrix_dense_mod, only: fsundensematrix
+   use fw_element_forces, only: element_forces
    use fw_interrupt, only: must_end
    use fw_kinds, only: i8, pi, wp
    use fw_linalg, only: lu_type
@@ -34,6 +35,8 @@ module fw_smooth_integration
    !> it bounds, are not too many.
    real(wp), parameter :: moderate_ratio = 200.0_wp
    integer(c_long), parameter :: max_steps = 1000000_c_long
+   !> Motions of a period that a law of a user may have no force for.
+   integer, parameter :: most_refusals = 200
 
    !> In tau = omega t, with w = dx/dtau: dw/dtau = load - stiffness x - damping w - springs, all
    !> divided by the mass and omega**2, so that both halves of the state have one unit.
@@ -46,6 +49,10 @@ module fw_smooth_integration
       integer, allocatable :: power(:)
       !> What the loads behind the third are; their frequency is in them.
       type(load_waves) :: waves
+      !> Elements that are neither pairs nor springs, if there are any, and the frequency, which
+      !> they are told.
+      type(element_forces), allocatable :: elements
+      real(wp) :: omega = 0.0_wp
    end type acceleration_type
 
    type, extends(period_map) :: smooth_integration
@@ -54,6 +61,8 @@ module fw_smooth_integration
       !> Observed quantities (n_observed, n_dof).
       real(wp), allocatable :: observe(:, :)
       type(period_record) :: record
+      !> What the law of an element said that ended the last period; blank: none did.
+      character(400) :: complaint = ''
    contains
       procedure :: integrate
    end type smooth_integration
@@ -133,6 +142,16 @@ contains
       acceleration%damping = acceleration%damping/omega
       acceleration%load = acceleration%load/omega**2
       acceleration%springs = acceleration%springs/omega**2
+      acceleration%omega = omega
+      if (.not. allocated(structure%elements)) return
+      acceleration%elements = structure%elements
+      do w = 1, size(acceleration%elements%kind)
+         associate (kind => acceleration%elements%kind(w))
+            kind%push = kind%rows
+            call solve_columns(mass, kind%push)
+            kind%push = kind%push/omega**2
+         end associate
+      end do
    end subroutine divide_by_mass
 
    !> In place, column by column of a matrix.
@@ -176,6 +195,11 @@ contains
                             dot_product(a%rows(:, i), y(:n))**a%power(i)
       end do
       status = 0
+      if (.not. allocated(a%elements)) return
+      call a%elements%add(t, a%omega, y(:n), a%omega*y(n + 1:2*n), slope(n + 1:2*n))
+      ! Without a force for this motion CVODE tries a shorter step; what ends the run ends it here.
+      if (a%elements%status < 0) status = 1_c_int
+      if (a%elements%status > 0 .or. a%elements%n_refused > most_refusals) status = -1_c_int
    end function evaluate
 
    !> One period from a state (displacements, velocities); see period_map.
@@ -223,6 +247,10 @@ contains
          call fcvodefree(memory)
       end if
       finish = [y(:n), self%omega*y(n + 1:)]
+      self%complaint = ''
+      if (.not. done .and. allocated(acceleration%elements)) then
+         self%complaint = acceleration%elements%complaint
+      end if
       status = fsunlinsolfree(solver)
       call fsunmatdestroy(matrix)
       call fn_vdestroy(y_vector)

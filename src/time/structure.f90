@@ -8,6 +8,8 @@
 module fw_time_structure
    use fw_kinds, only: wp
    use fw_contact_data, only: contact_type, spring_type
+   use fw_element_forces, only: element_forces, new_element_forces
+   use fw_elements, only: element_list
    use fw_error, only: error_type, fatal_error, status_failure
    use fw_lapack, only: dgemm, dsyevd
    use fw_laws, only: build_law
@@ -53,6 +55,8 @@ module fw_time_structure
       !> Springs: force coefficient * e**power (n_springs).
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
+      !> Elements that are neither; not allocated where there are none.
+      type(element_forces), allocatable :: elements
       !> Projection on the directions with mass (n_dof, n_dof); not allocated where all have mass.
       real(wp), allocatable :: massive(:, :)
    contains
@@ -62,7 +66,7 @@ module fw_time_structure
 contains
 
    !> Prepare a model; `present` marks the components of the pairs that are in use (3, n_pairs).
-   subroutine new_time_structure(model, contact, springs, present, self, error)
+   subroutine new_time_structure(model, contact, springs, present, self, error, elements)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
@@ -70,6 +74,8 @@ contains
       type(time_structure), intent(out) :: self
       !> status_failure where the eigenvalues of the mass cannot be computed.
       type(error_type), allocatable, intent(out) :: error
+      !> Others, whose forces follow from the motion at the same instant (default: none).
+      type(element_list), intent(in), optional :: elements
 
       self%n_dof = model%n_dof
       self%n_pairs = contact%n_pairs
@@ -81,8 +87,20 @@ contains
       self%waves = model%waves
       call take_pairs(contact, present, self)
       call take_springs(springs, self)
+      call take_elements(self, elements)
       call find_massless(self, error)
    end subroutine new_time_structure
+
+   !> What is neither pair nor spring.
+   subroutine take_elements(self, elements)
+      type(time_structure), intent(inout) :: self
+      type(element_list), intent(in), optional :: elements
+
+      if (.not. present(elements)) return
+      if (elements%n_elements() == 0) return
+      allocate (self%elements)
+      call new_element_forces(elements, self%n_dof, self%elements)
+   end subroutine take_elements
 
    !> Components that an elastic law gives no stiffness transmit nothing and are left out.
    subroutine take_pairs(contact, present, self)

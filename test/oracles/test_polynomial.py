@@ -231,7 +231,3 @@ def test_even_terms_keep_even_harmonics(tmp_path):
     run(tmp_path, case)
 
 
-def test_what_does_not_go_together_is_refused(tmp_path):
-    case = groups(EXACT["coupled"]["params"], energy([[0.1, [2, 2]]]), 3)
-    case["case"] = case["case"] | {"analysis": "time"}
-    assert "elements beside pairs and springs" in run(tmp_path, case, status=3).stderr
