@@ -156,8 +156,8 @@ def write_user_laws(rows: list[UserLaw]) -> str:
         f"A row of {N_ELEMENTS} masses with smooth friction on each, {POINTS} frequencies, H = 7, "
         f"{INSTANTS} instants: as pairs of the law `regularised`, and as functions of a user. "
         f"Processor time of the whole run in one thread, the least of {RUNS}, Newton steps, and "
-        "the largest difference of the amplitudes from those of the pairs. The ratio is that of the "
-        "times.", "",
+        "the largest difference of the amplitudes from those of the pairs. The ratio is that of "
+        "the times.", "",
         *table(["law", "time [ms]", "steps", "difference", "ratio", "wanted"],
                [(r.language, milliseconds(r.seconds), str(r.steps), f"{r.difference:.0e}",
                  f"{r.ratio:.2f}", "" if r.language not in WANTED else

@@ -68,9 +68,9 @@ from .user_law import Law
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model",
-           "NodalDiameter", "OutputError", "Point", "Polynomial", "Result", "RunInterrupted", "RunStopped",
-           "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf", "mode",
-           "optimise", "resonance", "run", "wear"]
+           "NodalDiameter", "OutputError", "Point", "Polynomial", "Result", "RunInterrupted",
+           "RunStopped", "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf",
+           "mode", "optimise", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

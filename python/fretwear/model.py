@@ -463,6 +463,7 @@ class Model:
                 "base/dof", "base/direction", "load/table",
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
+            loads.update((name, found.get(name)) for name in _MATRICES)
             try:
                 return cls(
                     found.get("mass"), found.get("damping"), found.get("stiffness"),
@@ -470,7 +471,6 @@ class Model:
                     springs=_springs_of(file), elements=read_elements(file),
                     sectors=read_sectors(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
-                    **{name: found.get(name) for name in _MATRICES},
                     base_dof=found.get("base/dof"), base_direction=found.get("base/direction"),
                     load_table=found.get("load/table"), stress=read_stress(file),
                     mistuning=read_mistuning(file),

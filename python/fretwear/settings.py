@@ -440,9 +440,9 @@ class User(TypedDict, total=False):
     odd: bool
     #: functions may be called from several threads (default: .false.)
     thread_safe: bool
-    #: slopes are compared with differences before the run (default: .true.)
+    #: functions are tried before the run: slopes, symmetry, memory (default: .true.)
     check: bool
-    #: what they may differ by, over the largest slope; only: check (default: 1e-5)
+    #: what slopes and odd forces may be off, relative; only: check (default: 1e-5)
     check_tolerance: float
 
 

@@ -152,11 +152,11 @@ class BoundLaw:
                   by_force: Any) -> int:
         n, m = call.n_state, call.n_in
         tau = np.ctypeslib.as_array(call.tau, (2,))
-        arguments = (np.ctypeslib.as_array(state, (n,)).copy(),
-                     np.ctypeslib.as_array(call.u, (2, m)), np.ctypeslib.as_array(call.v, (2, m)),
-                     tau / call.omega if call.omega > 0.0 else tau, call.omega)
+        arguments: tuple[Any, ...] = (
+            np.ctypeslib.as_array(state, (n,)).copy(), _shown(call.u, (2, m)),
+            _shown(call.v, (2, m)), tau / call.omega if call.omega > 0.0 else tau, call.omega)
         if self._takes_parameters:
-            arguments += (self.parameters,)
+            arguments += (self.parameters.copy(),)
         found = self.law.function(*arguments)
         if found is None:
             return -1
@@ -166,8 +166,8 @@ class BoundLaw:
         if not call.wants_derivative or self.law.derivative is None:
             return 0
         shapes = (n, n + 4 * m), (m, n + 2 * m)
-        for target, slope, shape in zip((by_state, by_force), self.law.derivative(*arguments),
-                                        shapes):
+        slopes = self._two(self.law.derivative(*arguments))
+        for target, slope, shape in zip((by_state, by_force), slopes, shapes):
             np.ctypeslib.as_array(target, shape)[...] = _shaped(f"{self.name}, derivative", slope,
                                                                 shape)
         return 0
@@ -175,26 +175,44 @@ class BoundLaw:
     def _try(self, call: Any, force: Any, by_u: Any, by_v: Any) -> int:
         shape = (call.n_time, call.n_in)
         tau = np.ctypeslib.as_array(call.tau, (call.n_time,))
-        u = np.ctypeslib.as_array(call.u, shape)
-        v = np.ctypeslib.as_array(call.v, shape)
-        arguments = (u, v, tau / call.omega if call.omega > 0.0 else tau, call.omega)
+        u, v = _shown(call.u, shape), _shown(call.v, shape)
+        t = tau / call.omega if call.omega > 0.0 else tau
+        arguments: tuple[Any, ...] = (u, v, t, call.omega)
         if self._takes_parameters:
-            arguments += (self.parameters,)
+            arguments += (self.parameters.copy(),)
         found = self.law.function(*arguments)
         if found is None:
             return -1
         np.ctypeslib.as_array(force, shape)[...] = _shaped(self.name, found, shape)
         if not call.wants_derivative or self.law.derivative is None:
             return 0
-        slopes = self.law.derivative(*arguments)
+        slopes = self._two(self.law.derivative(*arguments))
         for target, slope in zip((by_u, by_v), slopes):
             np.ctypeslib.as_array(target, (*shape, call.n_in))[...] = _shaped(
                 f"{self.name}, derivative", slope, (*shape, call.n_in))
         return 0
 
+    def _two(self, slopes: Any) -> tuple[Any, Any]:
+        """What a derivative returned, as two."""
+        if not isinstance(slopes, (tuple, list)) or len(slopes) != 2:
+            raise InputError(f"law {self.name}, derivative: returned a {type(slopes).__name__}, "
+                             "must be two arrays")
+        return slopes[0], slopes[1]
+
+
+def _shown(pointer: Any, shape: tuple[int, ...]) -> Floats:
+    """Numbers of the library, which a function may read and not write."""
+    values: Floats = np.ctypeslib.as_array(pointer, shape)
+    values.flags.writeable = False
+    return values
+
 
 def _shaped(name: str, found: Any, shape: tuple[int, ...]) -> Floats:
-    values = np.asarray(found, dtype=float)
+    values = np.asanyarray(found)
+    if values.dtype.kind not in "fiub" or isinstance(values, np.ma.MaskedArray):
+        raise InputError(f"law {name}: returned {values.dtype} in a {type(found).__name__}, must "
+                         "be real numbers")
+    values = np.asarray(values, dtype=float)
     if values.shape != shape:
         # Of one input the last ones may be left out.
         if shape[-1] == 1 and values.shape in ((), shape[:1]):

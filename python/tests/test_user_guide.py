@@ -32,6 +32,23 @@ def test_no_key_is_read_that_is_not_listed() -> None:
     assert declared == {name.split("%")[1] for name in read_keys()}
 
 
+#: Letters of the texts of a key (src/base/key.f90), beyond which they are cut without a word.
+ROOM = {"help": 160, "shape": 20, "absent": 60, "only": 60, "unit": 20}
+#: Letters of the name of an extent (src/io/reader.f90).
+EXTENT = 12
+
+
+def test_no_text_of_a_key_is_cut() -> None:
+    """What fills its room may have lost its end, or a blank there and what came behind it."""
+    shown = subprocess.run([PROGRAM, "--keys=json"], check=True, capture_output=True, text=True)
+    for group, content in json.loads(shown.stdout).items():
+        for name, key in content["keys"].items():
+            assert len(name) < 24, (group, name)
+            for part, room in ROOM.items():
+                assert len(key.get(part, "")) < room - 1, (group, name, part)
+            assert all(len(word) <= EXTENT for word in key.get("shape", "").split()), (group, name)
+
+
 def test_the_tables_and_the_settings_of_the_package_are_what_the_program_declares() -> None:
     """And what is compared is there: every group has its table and its class."""
     done = subprocess.run([sys.executable, ROOT / "tools" / "write_keys.py", "--check", PROGRAM],

@@ -131,13 +131,23 @@ contains
       integer :: c, i, k, row
 
       do k = 1, size(history%elements)
+         if (history%elements(k)%refuses > 0) then
+            call fatal_error(error, '&sweep stability: the law of element '// &
+                             to_text(history%elements(k)%refuses)//' of &user gives no force '// &
+                             'at one of the '//to_text(history%n_time)//' instants of the '// &
+                             'march; mend it, or switch stability off', status_input)
+            return
+         end if
          do i = 1, size(history%elements(k)%row, 2)
             if (.not. any(abs(history%elements(k)%by_v(:, :, i, :)) > 0.0_wp)) cycle
             do c = 1, size(history%elements(k)%row, 1)
-               if (.not. moves_static(basis, history%elements(k)%row(c, i))) cycle
+               row = history%elements(k)%row(c, i)
+               if (row == 0) cycle
+               if (.not. moves_static(basis, row)) cycle
                call fatal_error(error, '&sweep stability: element '//to_text(i)//' of &damper '// &
-                                'acts on a dof without mass and other damping; give it '// &
-                                'either, or switch stability off', status_input)
+                                'or &user takes velocities and acts on a dof without mass and '// &
+                                'other damping; give it either, or switch stability off', &
+                                status_input)
                return
             end do
          end do

@@ -4,7 +4,7 @@ module fw_stability_history
    use fw_force_law, only: force_law, force_workspace, pair_mixed, pair_stuck
    use fw_fourier, only: fourier_type, new_fourier
    use fw_friction, only: elastic_friction
-   use fw_instant_law, only: element_motion, instant_law
+   use fw_instant_law, only: element_motion, instant_law, reserve_motion
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
@@ -25,6 +25,9 @@ module fw_stability_history
       integer, allocatable :: row(:, :)
       !> (input, output, element, n_time) [force/length], [force time/length].
       real(wp), allocatable :: by_u(:, :, :, :), by_v(:, :, :, :)
+      !> An element that has no force at one of the instants, which may be more than those of the
+      !> balance; 0: none.
+      integer :: refuses = 0
    end type element_slopes
 
    type :: history_type
@@ -194,12 +197,9 @@ contains
       allocate (self%by_u(n, n, size(row, 2), fourier%n_time), source=0.0_wp)
       allocate (self%by_v, source=self%by_u)
       rates = rates_of(rows, omega)
-      motion%n_time = fourier%n_time
+      call reserve_motion(n, fourier%n_time, law%needs_scratch, motion)
       motion%omega = omega
       motion%wants_slopes = .true.
-      allocate (motion%u(n, fourier%n_time), motion%v(n, fourier%n_time), &
-                motion%force(n, fourier%n_time), motion%by_u(n, n, fourier%n_time), &
-                motion%by_v(n, n, fourier%n_time), source=0.0_wp)
       do i = 1, size(row, 2)
          motion%element = i
          motion%u = 0.0_wp
@@ -212,6 +212,8 @@ contains
             motion%v(c, :) = matmul(rates(:, row(c, i)), fourier%synthesis)
          end do
          call law%act(motion)
+         if (motion%status /= 0) self%refuses = i
+         motion%status = 0
          self%by_u(:, :, i, :) = motion%by_u
          self%by_v(:, :, i, :) = motion%by_v
       end do

@@ -25,6 +25,8 @@ module fw_shared_library
          character(kind=c_char), intent(in) :: name(*)
       end function dlsym
 
+      !> The same entry, by which C has data and functions alike: in Fortran they are different
+      !> types.
       type(c_funptr) function dlsym_function(library, name) bind(c, name='dlsym')
          import :: c_char, c_funptr, c_ptr
          implicit none (type, external)

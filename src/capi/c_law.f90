@@ -12,6 +12,7 @@ module fw_c_law
    implicit none (type, external)
    private
 
+   !> What lies beyond is memory that was not filled in.
    integer, parameter :: most_inputs = 100, most_parameters = 1000000, most_states = 1000
    !> Bits of flags: FW_LAW_ODD, FW_LAW_THREAD_SAFE, FW_LAW_NO_DERIVATIVE.
    integer, parameter :: bit_odd = 0, bit_thread_safe = 1, bit_no_derivative = 2
@@ -60,6 +61,8 @@ contains
       status = int(leave(session, error), c_int)
    end function c_add_law
 
+   !> An element of what the struct says. Each pointer is looked at before it is followed: the fault
+   !> of a program in C is told in words where it can be.
    subroutine take_law(given, name, element, fault)
       type(c_law), intent(in) :: given
       character(*), intent(in) :: name

@@ -234,8 +234,8 @@ contains
          asked = .not. pairs
       case ('group &base')
          asked = allocated(case%model%base_parts)
-      case ('laws of a user')
-         asked = case%elements%extent_of('user', 2) > 0
+      case ('states of a law of a user')
+         asked = has_states(case)
       case ("contact%memory = 'carried'")
          asked = pairs .and. case%contact%memory == memory_carried
       case ('pairs with two tangential directions')
@@ -262,6 +262,21 @@ contains
          known = .false.
       end select
    end subroutine of_joint
+
+   !> Whether a function of a user steps states of its own.
+   pure logical function has_states(case)
+      type(case_type), intent(in) :: case
+      integer :: k
+
+      has_states = .false.
+      if (.not. allocated(case%elements%slot)) return
+      do k = 1, size(case%elements%slot)
+         associate (group => case%elements%slot(k)%group)
+            if (.not. allocated(group%function)) cycle
+            has_states = has_states .or. any(group%function%n_state > 0)
+         end associate
+      end do
+   end function has_states
 
    !> Whether a pair slides in two directions.
    pure logical function has_two_tangents(case)

@@ -11,8 +11,12 @@ module fw_part_keys
 
    public :: part_keys
 
+   !> A visitor of keys that hands arrays and words on to a source of parts, and passes over the
+   !> rest. Values keep their defaults where the source has none.
    type, extends(key_visitor) :: part_keys
+      !> The file, the calling program or the list of parts that is gone through.
       class(part_source), pointer :: to => null()
+      !> Group that is open: first part of the path of a dataset.
       character(24) :: group = ''
    contains
       procedure :: open
@@ -31,6 +35,7 @@ module fw_part_keys
 
 contains
 
+   !> Keys that follow are parts of /group.
    subroutine open(self, group, help)
       class(part_keys), intent(inout) :: self
       character(*), intent(in) :: group, help
@@ -47,9 +52,12 @@ contains
       character(32) :: needed
       character(20) :: shape
 
+      ! What a namelist requires a file has to have, unless another key asks for it: that is judged
+      ! where both are known.
       needed = ''
       if (index(key%absent, 'required') > 0 .and. key%only == '') needed = 'with /'//self%group
       shape = part_shape(key%shape)
+      ! Keys that may have one value for all elements have datasets that may.
       if (key%repeats .and. index(trim(shape), ' ') == 0) shape = 'one_or '//shape(:13)
       part_of = part(trim(self%group)//'/'//trim(key%name), trim(shape), trim(key%help), needed)
    end function part_of
@@ -63,6 +71,7 @@ contains
 
       words = ''
       rest = shape
+      ! Word by word, each put in front of those before it: the last extent of a key runs slowest.
       do while (len_trim(rest) > 0)
          blank = index(rest, ' ')
          word = rest(:blank - 1)
@@ -82,6 +91,8 @@ contains
    end function one_of
 
    !> A word is an attribute of the group.
+   !> The choice stays as it is where the attribute is absent; a word that is none of the list is
+   !> refused with the list.
    subroutine bind_word(self, key, choice, words)
       class(part_keys), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -103,6 +114,7 @@ contains
       call self%to%refuse(row, '"'//text//'"', 'one of the words '//all_words(words))
    end subroutine bind_word
 
+   !> Words in quotation marks, as a message lists them.
    pure function all_words(words) result(text)
       character(*), intent(in) :: words(:)
       character(80) :: text
@@ -127,6 +139,7 @@ contains
       end associate
    end subroutine bind_words
 
+   !> An empty list is given back, since the caller looks at its size.
    subroutine bind_list(self, key, accepts, most, values, is_text)
       class(part_keys), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -179,6 +192,7 @@ contains
       end associate
    end subroutine bind_text
 
+   !> An array is a dataset; it stays unallocated where the file has none.
    subroutine bind_reals(self, key, values, needed, default)
       class(part_keys), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -191,6 +205,7 @@ contains
       end associate
    end subroutine bind_reals
 
+   !> Likewise, of dofs and other whole numbers.
    subroutine bind_integers(self, key, values, needed, default)
       class(part_keys), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -203,6 +218,7 @@ contains
       end associate
    end subroutine bind_integers
 
+   !> Extents are those of the datasets, not of keys.
    subroutine set_size(self, name, extent)
       class(part_keys), intent(inout) :: self
       character(*), intent(in) :: name
@@ -212,6 +228,7 @@ contains
       end associate
    end subroutine set_size
 
+   !> Those of the first dataset that had the words of the shape.
    pure function extents(self, shape)
       class(part_keys), intent(in) :: self
       character(*), intent(in) :: shape

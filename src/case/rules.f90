@@ -187,8 +187,10 @@ module fw_rules
 
    !> Groups of elements that are neither pairs nor springs.
    type(rule_type), parameter :: of_elements(*) = [ &
-      rule_type('laws of a user', "case%analysis = 'time'", &
-                "use 'frf' or 'point'")]
+      rule_type('states of a law of a user', "case%analysis = 'time'", &
+                "use 'frf' or 'point'"), &
+      rule_type('states of a law of a user', 'sweep%stability = .true.', &
+                'perturbations of its states are not followed: leave stability out')]
 
    type(rule_type), parameter :: of_wear(*) = [ &
       rule_type("case%analysis = 'wear'", 'a case without contact pairs', &

@@ -1,8 +1,10 @@
-!> Slopes that laws of a user give, compared with differences of their forces before a run.
+!> Laws of a user are looked at before a run: whether forces follow from the motion at the same
+!> instant, or from that and the states, whether they are odd where that is promised, and whether
+!> slopes that they give are those of their forces. None of this would show in a solution.
 !>
 !> Motions are those of the linear solution with all pairs closed, at 0.1, 1 and 3 times its size
-!> and with 1 % of noise. Central differences with three steps, of which the best counts; where the
-!> differences to both sides disagree the force has a corner, and nothing is compared.
+!> and with 1 % of noise. Slopes: central differences with three steps, of which the best counts;
+!> where the differences to both sides disagree the force has a corner, and nothing is compared.
 module fw_law_check
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
@@ -18,12 +20,18 @@ module fw_law_check
 
    public :: check_group
 
+   !> Enough to meet both signs of displacements and rates several times.
    integer, parameter :: n_instants = 20
+   !> Motions over the linear one; and steps of the differences over the size of the input: the
+   !> longest serves forces with much round-off, the shortest those with much curvature.
    real(wp), parameter :: sizes(*) = [0.1_wp, 1.0_wp, 3.0_wp], noise = 0.01_wp, &
                           steps(*) = [1.0e-3_wp, 1.0e-4_wp, 1.0e-5_wp]
    !> Disagreement of one-sided differences, over the largest slope, that is a corner with the
    !> smallest step: curvature leaves less.
    real(wp), parameter :: corner = 1.0e-2_wp
+   !> Of the largest force: what the same motion may be answered by again. A function does the same
+   !> operations, but for sums whose order differs.
+   real(wp), parameter :: same = 1.0e-9_wp
 
    !> Motions of one element (n_in, n_instants), and what it says of them.
    type :: trial_type
@@ -43,7 +51,9 @@ contains
       real(wp), allocatable :: x(:), y(:, :, :)
       integer :: i, s
 
+      ! A balance without joint has no motion of its elements that would be worth a test.
       if (system%n == 0) return
+      ! With the joint stuck: no law has to be solved to have a motion of the right size.
       allocate (x(system%n))
       call stuck_guess(system, x)
       associate (entry => problem%forces%entry(law))
@@ -52,7 +62,6 @@ contains
                                        problem%fourier%n_coefficients, x, y)
       end associate
       do i = 1, group%n_elements
-         if (.not. group%function(i)%has_derivative) cycle
          do s = 1, size(sizes)
             call check_element(system%frequency(), group, i, sizes(s), problem, y(i, :, :), error)
             if (allocated(error)) return
@@ -79,13 +88,18 @@ contains
       associate (element => group%function(i))
          call make_motion(omega, size_of, problem, y(:element%n_in, :), trial)
          if (element%n_state > 0) then
-            call check_step(group, i, trial, error)
+            call check_walk(group, i, trial, error)
+            if (element%has_derivative .and. .not. allocated(error)) then
+               call check_step(group, i, trial, error)
+            end if
             return
          end if
-         call element%ask(trial%omega, trial%tau, trial%u, trial%v, .true., trial%force, &
-                          trial%by_u, trial%by_v, status, instant)
+         call element%ask(trial%omega, trial%tau, trial%u, trial%v, element%has_derivative, &
+                          trial%force, trial%by_u, trial%by_v, status, instant)
          ! What it has no force for shows in the solution, if that comes there.
          if (status /= 0) return
+         call check_forces(group, i, trial, error)
+         if (allocated(error) .or. .not. element%has_derivative) return
          do turn = 1, 2
             of_rate = turn == 2
             do j = 1, element%n_in
@@ -97,6 +111,124 @@ contains
          end do
       end associate
    end subroutine check_element
+
+   !> Forces at the same motion again, its instants in reverse, and at the opposite motion half a
+   !> period later.
+   subroutine check_forces(group, i, trial, error)
+      class(element_group), intent(in) :: group
+      integer, intent(in) :: i
+      type(trial_type), intent(in) :: trial
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: half = n_instants/2
+      real(wp), dimension(size(trial%u, 1), n_instants) :: u, v, force
+      real(wp) :: none(size(trial%u, 1), size(trial%u, 1), 0), largest, tau(n_instants)
+      integer :: status, instant
+
+      largest = maxval(abs(trial%force))
+      associate (element => group%function(i))
+         tau = trial%tau(n_instants:1:-1)
+         u = trial%u(:, n_instants:1:-1)
+         v = trial%v(:, n_instants:1:-1)
+         call element%ask(trial%omega, tau, u, v, .false., force, none, none, status, instant)
+         if (any(abs(u - trial%u(:, n_instants:1:-1)) > 0.0_wp) .or. &
+             any(abs(v - trial%v(:, n_instants:1:-1)) > 0.0_wp)) then
+            call refuse(element, i, 'writes into u or v: both are of the program; copy them', error)
+            return
+         end if
+         ! A motion that has forces once and none the next time is another one to the function.
+         if (status /= 0 .or. any(abs(force(:, n_instants:1:-1) - trial%force) > same*largest)) then
+            call refuse(element, i, 'gives other forces at the same motion when its instants '// &
+                        'come in another order: forces have to follow from u, v, t and omega '// &
+                        'at the same instant; what remembers is a step with states', error)
+            return
+         end if
+         if (.not. element%is_odd) return
+         u = -cshift(trial%u, half, dim=2)
+         v = -cshift(trial%v, half, dim=2)
+         call element%ask(trial%omega, trial%tau, u, v, .false., force, none, none, status, instant)
+         force = cshift(force, -half, dim=2)
+      end associate
+      if (status /= 0) return
+      if (any(abs(force + trial%force) > group%check_tolerance*largest)) then
+         call refuse_even(group%function(i), i, error)
+      end if
+   end subroutine check_forces
+
+   !> A turn of steps, the same once more, and the opposite one half a period later.
+   subroutine check_walk(group, i, trial, error)
+      class(element_group), intent(in) :: group
+      integer, intent(in) :: i
+      type(trial_type), intent(in) :: trial
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), dimension(size(trial%u, 1), n_instants) :: first, again
+      integer :: status
+
+      associate (element => group%function(i))
+         call walk(element, trial%omega, trial%tau, trial%u, trial%v, first, status)
+         ! What it has no force for shows in the solution, if that comes there.
+         if (status /= 0) return
+         call walk(element, trial%omega, trial%tau, trial%u, trial%v, again, status)
+         if (status /= 0 .or. any(abs(again - first) > same*maxval(abs(first)))) then
+            call refuse(element, i, 'gives other forces at the same motion from the same '// &
+                        'states: all that it remembers has to be in its states', error)
+            return
+         end if
+         ! From a start that is not at rest the opposite motion need not have the opposite forces.
+         if (.not. element%is_odd .or. any(abs(element%start) > 0.0_wp)) return
+         call walk(element, trial%omega, trial%tau + pi, -trial%u, -trial%v, again, status)
+      end associate
+      if (status /= 0) return
+      if (any(abs(again + first) > group%check_tolerance*maxval(abs(first)))) then
+         call refuse_even(group%function(i), i, error)
+      end if
+   end subroutine check_walk
+
+   !> What a function does that no solution would show.
+   subroutine refuse(element, i, what, error)
+      type(user_element), intent(in) :: element
+      integer, intent(in) :: i
+      character(*), intent(in) :: what
+      type(error_type), allocatable, intent(out) :: error
+
+      call fatal_error(error, 'user law '//trim(element%name)//' (element '//to_text(i)//') '// &
+                       what//' (check = .false. leaves this test out)', status_input)
+   end subroutine refuse
+
+   !> Odd harmonics alone would leave out what its forces have of even ones.
+   subroutine refuse_even(element, i, error)
+      type(user_element), intent(in) :: element
+      integer, intent(in) :: i
+      type(error_type), allocatable, intent(out) :: error
+
+      call refuse(element, i, 'is promised to be odd, but opposite motions have other than '// &
+                  'opposite forces: take odd = .false.', error)
+   end subroutine refuse_even
+
+   !> Steps of one turn from the start of the element.
+   subroutine walk(element, omega, tau, u, v, force, status)
+      type(user_element), intent(in) :: element
+      real(wp), intent(in) :: omega, tau(:), u(:, :), v(:, :)
+      !> At the ends of the steps (n_in, n_instants).
+      real(wp), intent(out) :: force(:, :)
+      integer, intent(out) :: status
+      real(wp) :: after(element%n_state + element%n_in), ends(2), state(element%n_state)
+      real(wp), dimension(element%n_in, 2) :: u_ends, v_ends
+      real(wp) :: none(element%n_state + 4*element%n_in, element%n_state + element%n_in)
+      integer :: before, k
+
+      force = 0.0_wp
+      state = element%start
+      do k = 1, n_instants
+         before = merge(n_instants, k - 1, k == 1)
+         ends = tau(k) - [2.0_wp*pi/n_instants, 0.0_wp]
+         u_ends = u(:, [before, k])
+         v_ends = v(:, [before, k])
+         call element%ask_step(omega, ends, u_ends, v_ends, .false., state, after, none, status)
+         if (status /= 0) return
+         state = after(:element%n_state)
+         force(:, k) = after(element%n_state + 1:)
+      end do
+   end subroutine walk
 
    !> Slopes of the steps of one turn, by all that they take.
    subroutine check_step(group, i, trial, error)

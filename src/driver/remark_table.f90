@@ -14,7 +14,10 @@ module fw_remark_table
       character(480) :: meaning
    end type remark_kind
 
+   !> The order is that of a run: the case, the model, then the solution by its analysis. A remark
+   !> does not change the status, but where its meaning says so.
    type(remark_kind), parameter :: remark_kinds(*) = [ &
+      ! Matrices and constants of a model that are most often a slip of the pen.
       remark_kind('negative stiffness', &
                   'the stiffness is not positive, even with the joint held along its '// &
                   'normals'), &
@@ -29,6 +32,7 @@ module fw_remark_table
       remark_kind('impact on mass', &
                   'law = ''rigid'' with a normal dof that has mass: not of high order '// &
                   'where it impacts'), &
+      ! What the program has chosen, and what it had to leave out.
       remark_kind('law chosen', &
                   'law was not given: ''rigid'' is taken, or ''dlft'' where something '// &
                   'given asks for instants (n_time, sampling = ''uniform'', histories, a '// &
@@ -41,6 +45,7 @@ module fw_remark_table
                   'law = ''regularised'': at some points velocities are so far above '// &
                   'slip_speed that friction turns round between two instants (n_time below '// &
                   '8 max abs(v)/v_0); not where an accuracy watches over the instants'), &
+      ! Parts of the input that change nothing: said, since they were meant to.
       remark_kind('not read', &
                   'the model file holds datasets, groups or attributes that nothing reads, '// &
                   'see model files'), &
@@ -57,6 +62,7 @@ module fw_remark_table
       remark_kind('another order', &
                   'speed_order is neither engine_order nor its negative, nor one of these '// &
                   'and a multiple of the number of sectors'), &
+      ! How far the model and the number of harmonics serve.
       remark_kind('accuracy chosen', &
                   'neither n_harmonics nor accuracy was given: a natural sweep or a point '// &
                   'with contact or nonlinear springs takes accuracy = 1e-2, where nothing '// &
@@ -74,6 +80,7 @@ module fw_remark_table
                   'modal_damping_up_to takes the lowest'), &
       remark_kind('one harmonic', &
                   'contact or springs, and n_harmonics = 1'), &
+      ! Wear: where its steps or its harmonics decide more than the law does.
       remark_kind('too few harmonics', &
                   'wear: a pair slips, and with 2H+1 harmonics it sticks or slips by less '// &
                   'than half: it wears for want of harmonics (the finer the mesh, the more '// &
@@ -93,6 +100,7 @@ module fw_remark_table
                   'order above 1/5 of it, whose error nothing estimates'), &
       remark_kind('profile depends on steps', &
                   'wear: with check_steps, halved steps move the profile by more than 2 %'), &
+      ! Campbell diagrams, and derivatives by parameters.
       remark_kind('campbell points', &
                   'campbell: frequencies near a crossing that could not be solved: its peak '// &
                   'may be missed'), &
@@ -108,6 +116,7 @@ module fw_remark_table
                   '&sensitivity: points where two peaks of a period are alike'), &
       remark_kind('no derivatives', &
                   '&sensitivity: points where the response folds'), &
+      ! Controlled responses and nonlinear modes: other solutions that are near.
       remark_kind('several loads', &
                   '&control: an amplitude that more than one load gives, as pairs stick or '// &
                   'slip; which is found depends on where the search begins: follow the '// &
@@ -126,6 +135,7 @@ module fw_remark_table
       remark_kind('onset from below', &
                   'a nonlinear mode sticks up to onset_amplitude, and no solution was '// &
                   'found just above: it may part there and turn back to lower amplitudes'), &
+      ! Resonances over a parameter, and what a sweep may have missed between its rows.
       remark_kind('no resonance', &
                   'analysis = ''resonance'': the sweep has no maximum to follow; status 4'), &
       remark_kind('lost resonance', &
@@ -159,6 +169,7 @@ module fw_remark_table
                   'model%modal_damping, or move the frequency'), &
       remark_kind('peak at the end', &
                   'the largest amplitude of a quantity is at an end of the sweep'), &
+      ! What could not be decided or followed to its end.
       remark_kind('stability undecided', &
                   'a multiplier is as near to the unit circle as its error: more harmonics '// &
                   'make it certain'), &
@@ -179,8 +190,11 @@ module fw_remark_table
       character(320) :: remedy
    end type message_kind
 
+   !> Only those whose remedy does not fit into the message: all others say what to do themselves.
+   !> Dots stand for names and numbers; a test looks for the words between them in the sources.
    type(message_kind), parameter :: message_kinds(*) = [ &
       message_kind( &
+         ! Files of earlier runs.
          'x.h5: its run had wear%order = 2, this case has ...', &
          '--restart goes on with the same case only: take the value back, or '// &
          'start from the depths with &contact worn'), &
@@ -191,6 +205,7 @@ module fw_remark_table
          '&contact worn x.h5: ...', &
          'name the result of a wear run of a joint with as many pairs'), &
       message_kind( &
+         ! Points and accuracies that were not reached.
          'point 12 of 41: ..., NOT CONVERGED', &
          'more points in the sweep; sweep in the other direction; more n_time '// &
          '(where events are located it changes little); penalty_scale 0.3 or 3; '// &
@@ -206,6 +221,7 @@ module fw_remark_table
          'there more harmonics cost much and did not come nearer to the accuracy: '// &
          'ask for less, or give n_harmonics'), &
       message_kind( &
+         ! Branches: each ends in its own way, and what it has is kept.
          'branch: its points run away at a constant parameter: ...', &
          'the frequency no longer changes along the branch while the static '// &
          'position grows without bound: all contact slips, and friction alone '// &
@@ -231,6 +247,7 @@ module fw_remark_table
          'branch: not at its end when the time of the run was over', &
          'case%max_seconds ended it; what it has is kept. Exit status 6'), &
       message_kind( &
+         ! Nonlinear modes.
          'the mode ended: no solution was found beyond ...', &
          'with mode%continuation = ''natural'' the curve may fold: take '// &
          '''arclength''. Or nothing holds the structure once all pairs slip; what '// &
@@ -243,6 +260,7 @@ module fw_remark_table
          'output%observe: the first observed quantity is at a node of mode ...', &
          'name another first, or take &mode control = ''modal'''), &
       message_kind( &
+         ! Cases and models that are refused.
          '... does not go with ...: ...', &
          'what stands behind the colon; fw_run --rules lists all of them'), &
       message_kind( &

@@ -128,7 +128,7 @@ contains
       call close_run(case, run, clock, outcome, error, image)
    end subroutine run_case
 
-   !> Slopes that laws of the user give, compared with differences (fw_law_check).
+   !> Laws of the user are looked at before anything is solved (fw_law_check).
    subroutine check_user_laws(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
@@ -140,7 +140,7 @@ contains
       do k = 1, size(case%elements%slot)
          associate (group => case%elements%slot(k)%group)
             if (.not. group%check .or. .not. allocated(group%function)) cycle
-            if (.not. any(group%function%has_derivative)) cycle
+            if (size(group%function) == 0) cycle
             call build_system(case, problem, system, error)
             if (allocated(error)) return
             ! Natural frequencies are asked for without one.

@@ -20,6 +20,7 @@ module fw_element_group
 
    public :: element_group, group_name_length
 
+   !> Names of groups are short, so that they fit into keys as `group%key`.
    integer, parameter :: group_name_length = 12
 
    type, abstract :: element_group

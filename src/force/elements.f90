@@ -15,6 +15,7 @@ module fw_elements
    !> A new kind is a line in `new_group`, and one more here.
    integer, parameter :: n_element_kinds = 3
 
+   !> A group by its kind: an array of one abstract type needs a box for each.
    type :: element_slot
       class(element_group), allocatable :: group
    end type element_slot
@@ -63,6 +64,7 @@ contains
    end subroutine start
 
    !> Elements with laws of a program, behind those that the input gives.
+   !> All groups are asked, and that of the user alone takes them.
    subroutine add_laws(self, laws)
       class(element_list), intent(inout) :: self
       type(user_element), intent(in) :: laws(:)
@@ -125,6 +127,7 @@ contains
    !> Which kind a group of the namelist is; 0 where it is none of these.
    integer function element_kind(name) result(kind)
       character(*), intent(in) :: name
+      ! The names are asked of the groups: they stand nowhere else.
       type(element_list) :: list
       integer :: k
 
@@ -180,6 +183,7 @@ contains
       end do
    end function coefficients_of
 
+   !> A sweep over the parameter `<group>%coefficient` sets them at every point.
    pure subroutine set_coefficients(self, name, values)
       class(element_list), intent(inout) :: self
       character(*), intent(in) :: name

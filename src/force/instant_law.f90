@@ -183,6 +183,8 @@ contains
       end associate
    end subroutine differentiate_path
 
+   !> Room for one element over the period, and for the numbers one behind the other where they are
+   !> wanted.
    pure subroutine reserve_motion(n_in, n_time, with_scratch, motion)
       integer, intent(in) :: n_in, n_time
       logical, intent(in) :: with_scratch
@@ -204,6 +206,8 @@ contains
       allocate (motion%by_u(n_in, n_in, n_time), motion%by_v(n_in, n_in, n_time), source=0.0_wp)
    end subroutine reserve_motion
 
+   !> Forces of all elements: to the instants, element by element, and back. A refusal is noted with
+   !> its place, and the others are gone through all the same, since a later one may end the run.
    subroutine evaluate(self, fourier, work)
       class(instant_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -289,6 +293,8 @@ contains
       end select
    end subroutine take_motion
 
+   !> Derivatives at the inputs of the last evaluation; of each pair of an input and a force one
+   !> block.
    subroutine linearize(self, fourier, work)
       class(instant_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier

@@ -17,6 +17,7 @@ module fw_user_element
    public :: bad_number, law_call, user_call, user_element, user_law_type
 
    !> The status of a force that is not a number.
+   !> Negative numbers are those of functions; this one is beyond what anybody returns on purpose.
    integer, parameter :: bad_number = -1000000
 
    !> struct fw_law_call of fretwear.h: the order and the kinds are part of the binary interface.
@@ -28,6 +29,8 @@ module fw_user_element
       type(c_ptr) :: tau = c_null_ptr, u = c_null_ptr, v = c_null_ptr, parameters = c_null_ptr
    end type law_call
 
+   !> fw_law_force and fw_law_step of fretwear.h. Results are addresses, of which slopes may be
+   !> null: arrays by reference could not say that they are not wanted.
    abstract interface
       integer(c_int) function c_law_force(user, call, force, du, dv) bind(c)
          import :: c_int, c_ptr, law_call
@@ -60,6 +63,9 @@ module fw_user_element
    end type user_call
 
    !> What a program in Fortran extends, with one of the two.
+   !> A law without states has `evaluate`, one with states `step`. Neither is deferred, so that a
+   !> type need not write the other; which of the two is called follows from `start` of `add_law`,
+   !> and the one that was not written ends the run.
    type, abstract :: user_law_type
    contains
       procedure :: evaluate
@@ -80,6 +86,8 @@ module fw_user_element
       integer :: n_state = 0
       real(wp), allocatable :: start(:)
       !> A step where there are states.
+      !> In C, of a library or a program, with the pointer that is handed on to it; or an object of
+      !> a program in Fortran, which is pointed to, since it belongs to that program.
       type(c_funptr) :: function = c_null_funptr
       type(c_ptr) :: user = c_null_ptr
       class(user_law_type), pointer :: object => null()
@@ -141,6 +149,7 @@ contains
       integer, intent(out) :: status, instant
       integer :: k
 
+      ! Zeros everywhere: a function need not set slopes that are none.
       status = 0
       instant = 1
       force = 0.0_wp
@@ -152,6 +161,7 @@ contains
          call ask_function(self, omega, tau, u, v, wants, force, du, dv, status)
       end if
       if (status /= 0) return
+      ! A number that is not finite would spread over the whole balance and lose its place.
       do k = 1, size(u, 2)
          if (.not. all(ieee_is_finite(force(:, k)))) status = bad_number
          if (wants) then
@@ -164,6 +174,8 @@ contains
       end do
    end subroutine ask
 
+   !> The function of C. Arrays of the caller go in by their addresses, nothing is copied: they are
+   !> contiguous with the inputs innermost, which is the order of C.
    subroutine ask_function(self, omega, tau, u, v, wants, force, du, dv, status)
       class(user_element), intent(in), target :: self
       real(wp), intent(in) :: omega
@@ -188,6 +200,7 @@ contains
       status = int(function(self%user, request, c_loc(force), by_u, by_v))
    end subroutine ask_function
 
+   !> The object of a program in Fortran, by pointers to the same arrays.
    subroutine ask_object(self, omega, tau, u, v, wants, force, du, dv, status)
       class(user_element), intent(in), target :: self
       real(wp), intent(in) :: omega
@@ -218,6 +231,8 @@ contains
       real(wp), intent(inout), contiguous :: slope(:, :)
       !> 0, what the function returned, or `bad_number`.
       integer, intent(out) :: status
+      ! The function gets slopes of its forces by the state after the step, which it has at hand;
+      ! the march wants them by what the step began with, by the chain rule below.
       real(wp), target :: new(self%n_state), force(self%n_in)
       real(wp), target :: dstate(self%n_state + 4*self%n_in, self%n_state)
       real(wp), target :: dforce(self%n_state + 2*self%n_in, self%n_in)
@@ -252,12 +267,16 @@ contains
       if (status /= 0) return
       if (.not. all(ieee_is_finite(after))) status = bad_number
       if (.not. wants) return
+      ! d(force)/d(before) = d(force)/d(state after) d(state after)/d(before), and what the inputs
+      ! at the end give directly.
       slope(:, :n) = dstate
       slope(:, n + 1:) = matmul(dstate, dforce(:n, :))
       slope(n + 2*m + 1:, n + 1:) = slope(n + 2*m + 1:, n + 1:) + dforce(n + 1:, :)
       if (.not. all(ieee_is_finite(slope))) status = bad_number
    end subroutine ask_step
 
+   !> What a function of C is told. `size` is that of this struct: later versions may be longer, and
+   !> a function that was built with this one finds its numbers where they were.
    subroutine fill_request(self, omega, tau, u, v, wants, request)
       class(user_element), intent(in), target :: self
       real(wp), intent(in) :: omega
@@ -278,6 +297,7 @@ contains
       if (wants) request%wants_derivative = 1_c_int
    end subroutine fill_request
 
+   !> What an object of Fortran is told.
    subroutine fill_call(self, omega, tau, u, v, wants, request)
       class(user_element), intent(in), target :: self
       real(wp), intent(in) :: omega

@@ -1,5 +1,10 @@
 !> Group &user: elements with laws of a user, by functions of a shared library; and those that a
 !> calling program adds, which have no keys.
+!>
+!> The keys tell the functions apart by the name of the symbol; all elements of the group come from
+!> one library and have as many inputs and constants each. Elements of a program have sides, inputs
+!> and constants of their own (`take_laws`), so that rows are filled from the elements and not from
+!> the keys. A model file holds none of this: a function is no number.
 module fw_user_group
    use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_ptr
    use fw_element_group, only: element_group, group_name_length
@@ -17,19 +22,26 @@ module fw_user_group
 
    public :: user_group
 
+   !> Whose slopes Newton's method takes: those of the functions, or central differences.
    character(*), parameter :: derivative_words(*) = [character(10) :: 'given', 'difference']
    integer, parameter :: given = 1
    !> The number of the interface of fretwear.h that a library has to have.
    integer, parameter :: interface_number = 1
+   !> Limits of the keys: far above any use, low enough that a mistyped number asks for no memory.
    integer, parameter :: most = 100000, most_inputs = 100, most_states = 1000
 
    type, extends(element_group) :: user_group
+      !> As it stands in the namelist; `load` looks for it beside the namelist.
       character(:), allocatable :: library
+      !> Names of the functions: one for all elements, or one for each.
       type(string_type), allocatable :: symbol(:)
+      !> Of each element: inputs and constants. `n_in` of the parent is that of the widest element,
+      !> and may be larger than `inputs` once a program has added laws of its own.
       integer :: inputs = 1, n_parameters = 0, derivative = given
       !> (n_in, n_elements), and (n_parameters, n_elements).
       integer, allocatable :: side_1(:, :), side_2(:, :)
       real(wp), allocatable :: parameters(:, :)
+      !> What is promised of all functions of the library.
       logical :: odd = .false., thread_safe = .false.
    contains
       procedure :: name
@@ -49,6 +61,7 @@ module fw_user_group
 
 contains
 
+   !> Of the namelist; no group of a model file has it.
    pure function name(self)
       class(user_group), intent(in) :: self
       character(group_name_length) :: name
@@ -58,6 +71,7 @@ contains
       end associate
    end function name
 
+   !> The key that `n_given` is read from.
    pure function count_key(self)
       class(user_group), intent(in) :: self
       character(group_name_length) :: count_key
@@ -67,6 +81,7 @@ contains
       end associate
    end function count_key
 
+   !> The number goes first: the shapes of the other keys are made of it.
    subroutine bind_count(self, keys)
       class(user_group), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
@@ -76,6 +91,8 @@ contains
       call keys%set_size('n_elements', self%n_given)
    end subroutine bind_count
 
+   !> Extents are set as soon as they are read, since the arrays that follow have them. What is only
+   !> needed with elements is required where there are some, so that an empty group says nothing.
    subroutine bind_keys(self, keys)
       class(user_group), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
@@ -87,7 +104,7 @@ contains
                          'namelist', absent='required with n_elements'), self%library, needed)
       call keys%bind_list(key('symbol', 'name of the function, one for all or one for each '// &
                               'element', absent='required with n_elements'), &
-                          'names of functions', max(1, self%n_given), self%symbol, is_text)
+                          'names of functions', most, self%symbol, is_text)
       call keys%bind(key('n_in', 'displacements that each element takes', &
                          from_to(1, most_inputs)), self%inputs)
       call keys%set_size('n_in', self%inputs)
@@ -108,9 +125,9 @@ contains
       call keys%bind(key('odd', 'opposite motions have opposite forces: you promise it'), self%odd)
       call keys%bind(key('thread_safe', 'functions may be called from several threads'), &
                      self%thread_safe)
-      call keys%bind(key('check', 'slopes are compared with differences before the run'), &
+      call keys%bind(key('check', 'functions are tried before the run: slopes, symmetry, memory'), &
                      self%check)
-      call keys%bind(key('check_tolerance', 'what they may differ by, over the largest slope', &
+      call keys%bind(key('check_tolerance', 'what slopes and odd forces may be off, relative', &
                          above(0.0_wp), only='check'), self%check_tolerance)
    end subroutine bind_keys
 
@@ -123,6 +140,7 @@ contains
       end associate
    end function n_held
 
+   !> A file that held the sides without the functions would be half a model.
    pure logical function is_in_models(self)
       class(user_group), intent(in) :: self
 
@@ -131,6 +149,9 @@ contains
       end associate
    end function is_in_models
 
+   !> What the ranges of the keys do not say: as many symbols as elements, and two sides of an input
+   !> that differ. One that has the same dof on both sides moves by nothing whatever the structure
+   !> does, and is a misprint.
    pure subroutine find_fault(self, key, text)
       class(user_group), intent(in) :: self
       character(24), intent(out) :: key
@@ -157,8 +178,12 @@ contains
    end subroutine find_fault
 
    !> Open the library and find the functions.
+   !> It is opened when the case is read, so that what is missing is told before any work is done,
+   !> and never closed (see `open_library`). A library that is not found is a fault of a file
+   !> (status 5), one without the function a fault of the input (status 3).
    subroutine load(self, folder, error)
       class(user_group), intent(inout) :: self
+      !> Of the namelist; empty where the case came as a text.
       character(*), intent(in) :: folder
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: path
@@ -186,7 +211,10 @@ contains
    end subroutine load
 
    !> Whether the library was made for this program.
+   !> A number that the library exports stands for the layout of `fw_law_call` that it was built
+   !> with: a function that read another layout would give wrong forces without a word.
    subroutine check_interface(path, library, error)
+      !> As it is named in the namelist, for the messages.
       character(*), intent(in) :: path
       type(c_ptr), intent(in) :: library
       type(error_type), allocatable, intent(out) :: error
@@ -206,6 +234,9 @@ contains
                        'version', status_input)
    end subroutine check_interface
 
+   !> Element i with what the keys say of it, and its function. Whether it remembers is not said by
+   !> a key: the library says so by exporting the number of states beside the function, so that a
+   !> step cannot be called as a force, nor the other way round.
    subroutine find_element(self, library, i, error)
       class(user_group), intent(inout) :: self
       type(c_ptr), intent(in) :: library
@@ -241,6 +272,7 @@ contains
       integer(c_int), pointer :: number
       real(c_double), pointer :: values(:)
 
+      ! Without that number the function gives forces, and keeps nothing.
       address = find_address(library, symbol//'_states')
       if (.not. c_associated(address)) return
       call c_f_pointer(address, number)
@@ -252,12 +284,16 @@ contains
       end if
       element%n_state = int(number)
       allocate (element%start(element%n_state), source=0.0_wp)
+      ! A copy: what the library does with its own numbers later changes no run.
       address = find_address(library, symbol//'_start')
       if (.not. c_associated(address)) return
       call c_f_pointer(address, values, [number])
       element%start = values
    end subroutine find_states
 
+   !> Rows of the elements, from the elements themselves: those of a library and those of a program
+   !> may have different numbers of inputs. What an element has less than the widest one stays 0 on
+   !> both sides, which is no input.
    subroutine settle(self)
       class(user_group), intent(inout) :: self
       integer :: e
@@ -272,6 +308,8 @@ contains
    end subroutine settle
 
    !> Once: a case is read anew where laws are added.
+   !> Elements of a program come behind those of the library, whose numbers stay as the keys count
+   !> them.
    subroutine take_laws(self, laws)
       class(user_group), intent(inout) :: self
       type(user_element), intent(in) :: laws(:)
@@ -281,6 +319,7 @@ contains
       call self%settle()
    end subroutine take_laws
 
+   !> Sectors share the functions; each has elements of its own, one sector after the other.
    subroutine make_law(self, n_sectors, law)
       class(user_group), intent(in) :: self
       integer, intent(in) :: n_sectors
@@ -289,6 +328,7 @@ contains
       allocate (law, source=new_user_law(self%function, n_sectors))
    end subroutine make_law
 
+   !> One function without the promise takes the symmetry from the whole balance.
    pure logical function is_odd(self)
       class(user_group), intent(in) :: self
 
@@ -296,6 +336,7 @@ contains
    end function is_odd
 
    !> Nobody knows.
+   !> A function that is a spring in fact costs the iterations of a nonlinear one, no more.
    pure logical function is_linear(self)
       class(user_group), intent(in) :: self
 

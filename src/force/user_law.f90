@@ -20,6 +20,7 @@ module fw_user_law
    real(wp), parameter :: relative_step = 1.0e-5_wp
 
    type, extends(instant_law) :: user_law
+      !> Of all sectors (n_elements): copies, which share the functions and pointers of the user.
       type(user_element), allocatable :: element(:)
    contains
       procedure :: act
@@ -53,6 +54,9 @@ contains
       self%needs_scratch = any(element%n_in /= self%n_in) .or. .not. all(element%has_derivative)
    end function new_user_law
 
+   !> Forces of one element at all instants: of one that remembers by its path, of others by one
+   !> call of the function. A refusal (`motion%status`) leaves numbers that are not finite, by which
+   !> the solvers take the step back as after an overflow; `complaint` says later what it was.
    subroutine act(self, motion)
       class(user_law), intent(in) :: self
       type(element_motion), intent(inout) :: motion
@@ -94,6 +98,7 @@ contains
       motion%by_v = 0.0_wp
    end subroutine act
 
+   !> Room for the states and their derivatives, of the largest element that remembers.
    subroutine reserve_path(self, fourier, motion)
       class(user_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -102,6 +107,8 @@ contains
       if (allocated(self%remembers)) motion%path = new_path(self%element, fourier)
    end subroutine reserve_path
 
+   !> Derivatives of forces by the coefficients of the motion, of an element that remembers: they do
+   !> not follow from slopes at the instants.
    subroutine differentiate_path(self, fourier, motion, jacobian)
       class(user_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -148,6 +155,9 @@ contains
       call ask(element, motion, u, v, force, by_u, by_v)
    end subroutine ask_packed
 
+   !> Forces, and slopes as the function gives them or by differences of its forces: each input and
+   !> each rate is moved at all instants at once, which takes four calls for each input however many
+   !> instants there are.
    subroutine ask(element, motion, u, v, force, by_u, by_v)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
@@ -177,6 +187,8 @@ contains
       integer :: i, k, side
 
       if (motion%status /= 0) return
+      ! By the size of the input over the period; what does not move at all is moved by a small
+      ! number, since nothing tells its size.
       step = relative_step*merge(maxval(abs(v(j, :))), maxval(abs(u(j, :))), of_rate)
       if (.not. step > 0.0_wp) step = relative_step
       associate (s => motion%scratch, n => size(u, 1))
@@ -209,6 +221,7 @@ contains
 
    end subroutine differ
 
+   !> Forces alone.
    subroutine ask_once(element, motion, n, u, v, force)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion

@@ -16,6 +16,8 @@ module fw_read_elements
 
 contains
 
+   !> All groups, then the laws of a calling program: these come last, so that their numbers in
+   !> messages and results follow those of the keys.
    subroutine read_elements(reader, held, folder, elements, error, laws)
       type(reader_type), intent(inout) :: reader
       !> What the model holds.
@@ -62,8 +64,12 @@ contains
       end do
    end subroutine check_dofs
 
+   !> One group. Another number of elements than the model holds makes the arrays of the model
+   !> useless: then all of them have to be given. Libraries are opened only once nothing else is
+   !> wrong.
    subroutine read_group(reader, empty, folder, group, error)
       type(reader_type), intent(inout) :: reader
+      !> Without elements, and with the defaults of its keys.
       class(element_group), intent(in) :: empty
       character(*), intent(in) :: folder
       class(element_group), allocatable, intent(inout) :: group

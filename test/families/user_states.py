@@ -8,7 +8,7 @@ import joints
 import numpy as np
 from project import ROOT
 
-TITLE = "Laws of a user with states"
+TITLE = "Laws of a user with states: the same steps"
 TEXT = """
 Chains of one to six masses with one to four elements whose laws are steps in C, between masses or
 to the ground: sliders on springs, elements that relax (a tenth to ten periods), and sliders whose
@@ -147,7 +147,7 @@ def trial(seed, program, folder):
                     str(ROOT / "include"), "-o", "laws.so", "laws.c", "-lm"], cwd=folder,
                    check=True)
     (folder / "case.nml").write_text(text(case))
-    done = subprocess.run([program, "-q", "case.nml"], cwd=folder, capture_output=True, text=True,
+    done = subprocess.run([program, "case.nml"], cwd=folder, capture_output=True, text=True,
                           check=False)
     found = dict.fromkeys(COLUMNS, 0) | {"kind": "slopes given" if case["given"] else "differences"}
     if done.returncode == 4:

@@ -44,11 +44,13 @@ def merged(groups, changes):
     return result
 
 
-def run(folder, groups, *arguments, name="case", status=0, program=PROGRAM, seconds=120.0):
+def run(folder, groups, *arguments, name="case", status=0, program=PROGRAM, seconds=120.0,
+        quiet=True):
     """Run a case in a folder and want a status, or one of several; the process."""
     path = folder / f"{name}.nml"
     write_namelist(path, groups)
-    done = subprocess.run([program, "-q", *map(str, arguments), path.name], cwd=folder, text=True,
+    arguments = ["-q"] * quiet + list(map(str, arguments))
+    done = subprocess.run([program, *arguments, path.name], cwd=folder, text=True,
                           capture_output=True, timeout=limit(seconds), check=False, env=PATIENT)
     wanted = (status,) if isinstance(status, int) else status
     assert done.returncode in wanted, (
