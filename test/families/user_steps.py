@@ -162,7 +162,7 @@ def trial(seed, program, folder):
     found = dict.fromkeys(COLUMNS, 0)
     if done.returncode in (4, 6):
         return {**found, "kind": "not solved", "failed": 1,
-                "notes": [line for line in done.stderr.splitlines() if line][:1]}
+                "notes": [line for line in done.stderr.splitlines() if line][-1:]}
     assert done.returncode == 0, done.stderr
     with h5py.File(folder / "case.h5") as file:
         u, force, work = file["coefficients"][0], file["user/force"][0], file["user/work"][0]
