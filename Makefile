@@ -147,7 +147,7 @@ bench-scaling: build ## time and memory of a frequency, 16 to 768 pairs, beside 
 	PYTHONPATH=python $(PYTHON) -m bench.run scaling $(if $(BEFORE),--before $(BEFORE))
 
 bench-limit: build ## where the time goes against its floor, and what is skipped
-	PYTHONPATH=python $(PYTHON) -m bench.run limit skips laws
+	PYTHONPATH=python:$(BUILD)/python $(PYTHON) -m bench.run limit skips laws
 
 # Another environment's Python where pyharm-os is installed: make bench-peers PEER_PYTHON=...
 PEER_PYTHON ?= $(PYTHON)
@@ -157,7 +157,7 @@ bench-peers: build ## pyHarm on the same problems, where it is installed, and NL
 	   $(if $(BEFORE),--before $(BEFORE)) $(if $(NLVIB),--nlvib $(NLVIB))
 
 bench-full: build ## every part of docs/benchmarks.md
-	PYTHONPATH=python $(PYTHON) -m bench.run all --peer-python $(PEER_PYTHON)
+	PYTHONPATH=python:$(BUILD)/python $(PYTHON) -m bench.run all --peer-python $(PEER_PYTHON)
 
 # make compare OTHER=/path/to/fw_run TIMES=9
 TIMES ?= 0

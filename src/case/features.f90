@@ -236,8 +236,6 @@ contains
          asked = .not. pairs
       case ('group &base')
          asked = allocated(case%model%base_parts)
-      case ('laws of a user')
-         asked = case%elements%extent_of('user', 2) > 0
       case ('states of a law of a user')
          asked = has_states(case)
       case ("contact%memory = 'carried'")

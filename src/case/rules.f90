@@ -187,7 +187,7 @@ module fw_rules
 
    !> Groups of elements that are neither pairs nor springs.
    type(rule_type), parameter :: of_elements(*) = [ &
-      rule_type('laws of a user', "case%analysis = 'time'", &
+      rule_type('states of a law of a user', "case%analysis = 'time'", &
                 "use 'frf' or 'point'"), &
       rule_type('states of a law of a user', 'sweep%stability = .true.', &
                 'perturbations of its states are not followed: leave stability out')]

@@ -7,7 +7,7 @@
 module fw_time_response
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
-   use fw_case, only: analysis_frf, case_type
+   use fw_case, only: analysis_frf, analysis_time, case_type
    use fw_cycle_recovery, only: cycle_of_histories
    use fw_error, only: error_type, fatal_error, status_input
    use fw_guess, only: stuck_guess
@@ -62,8 +62,16 @@ contains
       call build_system(self%start_case, self%problem, self%system, error)
       if (allocated(error)) return
       call self%solver%start(self%start_case, self%start_case%harmonics, self%system%n)
-      call new_time_structure(case%model, case%contact, case%springs, case%elements, &
-                              self%system%problem%joint%row > 0, self%structure, error)
+      associate (present => self%system%problem%joint%row > 0)
+         if (case%analysis == analysis_time) then
+            call new_time_structure(case%model, case%contact, case%springs, present, &
+                                    self%structure, error, case%elements)
+         else
+            ! A start of a balance needs a motion, not this one: pairs go on without the others.
+            call new_time_structure(case%model, case%contact, case%springs, present, &
+                                    self%structure, error)
+         end if
+      end associate
    end subroutine start
 
    !> Nothing that the summary shows.

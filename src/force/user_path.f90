@@ -101,11 +101,15 @@ contains
       real(wp), intent(inout) :: state(n, 0:motion%n_time)
       real(wp), intent(inout) :: slope(n + 4*m, n + m, 0:motion%n_time)
       real(wp), intent(inout), dimension(n, m*path%n_coefficients) :: by_motion, carried
-      real(wp) :: change(n), last, apart, inverse(n, n)
-      integer :: turn
+      real(wp) :: change(n), last, apart, inverse(n, n), sizes(4*m)
+      integer :: j, turn
       logical :: done, wants
 
-      call strain(element, motion, n, m, differentiates, state(:, 0), slope(:, :, 0))
+      do j = 1, m
+         sizes([j, 2*m + j]) = maxval(abs(motion%u(j, :)))
+         sizes([m + j, 3*m + j]) = maxval(abs(motion%v(j, :)))
+      end do
+      call strain(element, motion, n, m, differentiates, sizes, state(:, 0), slope(:, :, 0))
       if (motion%status /= 0) return
       if (differentiates) then
          by_motion = 0.0_wp
@@ -114,7 +118,7 @@ contains
       apart = huge(1.0_wp)
       do turn = 1, plain_turns + newton_steps
          wants = differentiates .or. turn > plain_turns
-         call march(element, motion, n, m, wants, state, slope)
+         call march(element, motion, n, m, wants, sizes, state, slope)
          if (motion%status /= 0) return
          ! A turn has repeated where all states have; where round-off of the function lets them fall
          ! no further, the last change counts, if it is small.
@@ -156,11 +160,13 @@ contains
    end function share_of
 
    !> From the unstrained element to the motion where the first step begins.
-   subroutine strain(element, motion, n, m, wants, state, slope)
+   subroutine strain(element, motion, n, m, wants, sizes, state, slope)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
       integer, intent(in) :: n, m
       logical, intent(in) :: wants
+      !> Largest inputs over the period, as a step has them (u, v before, u, v after).
+      real(wp), intent(in) :: sizes(:)
       real(wp), intent(out) :: state(n)
       real(wp), intent(inout) :: slope(n + 4*m, n + m)
       real(wp) :: u(m, 2), v(m, 2), tau(2), after(n + m)
@@ -173,16 +179,19 @@ contains
       v(:, 2) = motion%v(:m, last)
       tau(2) = -2.0_wp*pi/last
       tau(1) = 2.0_wp*tau(2)
-      call one_step(element, motion, last, n, m, tau, u, v, wants, element%start, after, slope)
+      call one_step(element, motion, last, n, m, tau, u, v, wants, sizes, element%start, after, &
+                    slope)
       state = after(:n)
    end subroutine strain
 
    !> One turn.
-   subroutine march(element, motion, n, m, wants, state, slope)
+   subroutine march(element, motion, n, m, wants, sizes, state, slope)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
       integer, intent(in) :: n, m
       logical, intent(in) :: wants
+      !> As of `strain`.
+      real(wp), intent(in) :: sizes(:)
       real(wp), intent(inout) :: state(n, 0:motion%n_time)
       real(wp), intent(inout) :: slope(n + 4*m, n + m, 0:motion%n_time)
       real(wp) :: u(m, 2), v(m, 2), tau(2), after(n + m)
@@ -197,7 +206,7 @@ contains
          v(:, 2) = motion%v(:m, k)
          tau(2) = motion%tau(k)
          tau(1) = tau(2) - 2.0_wp*pi/motion%n_time
-         call one_step(element, motion, k, n, m, tau, u, v, wants, state(:, k - 1), after, &
+         call one_step(element, motion, k, n, m, tau, u, v, wants, sizes, state(:, k - 1), after, &
                        slope(:, :, k))
          if (motion%status /= 0) return
          state(:, k) = after(:n)
@@ -206,39 +215,29 @@ contains
    end subroutine march
 
    !> A step, with slopes that are given or by differences.
-   subroutine one_step(element, motion, k, n, m, tau, u, v, wants, state, after, slope)
+   subroutine one_step(element, motion, k, n, m, tau, u, v, wants, sizes, state, after, slope)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
       integer, intent(in) :: k, n, m
       real(wp), intent(in) :: tau(2)
       real(wp), intent(inout) :: u(m, 2), v(m, 2)
       logical, intent(in) :: wants
-      real(wp), intent(in) :: state(n)
+      !> As of `strain`.
+      real(wp), intent(in) :: sizes(:), state(n)
       real(wp), intent(out) :: after(n + m)
       real(wp), intent(inout) :: slope(n + 4*m, n + m)
+      real(wp) :: scale(n + 4*m)
 
       motion%instant = k
       call element%ask_step(motion%omega, tau, u, v, wants .and. element%has_derivative, state, &
                             after, slope, motion%status)
       if (motion%status /= 0 .or. .not. wants .or. element%has_derivative) return
-      call step_slopes(element, motion%omega, tau, u, v, state, relative_step, scales(), slope, &
+      scale(:n) = max(maxval(abs(state)), maxval(abs(after(:n))))
+      scale(n + 1:) = sizes
+      ! Where there is none, nothing tells a size.
+      where (.not. scale > 0.0_wp) scale = 1.0_wp
+      call step_slopes(element, motion%omega, tau, u, v, state, relative_step, scale, slope, &
                        motion%status)
-
-   contains
-
-      !> Sizes of the inputs of a step, 1 where there is none.
-      function scales() result(size_of)
-         real(wp) :: size_of(n + 4*m)
-         integer :: j
-
-         size_of(:n) = max(maxval(abs(state)), maxval(abs(after(:n))))
-         do j = 1, m
-            size_of([n + j, n + 2*m + j]) = maxval(abs(motion%u(j, :)))
-            size_of([n + m + j, n + 3*m + j]) = maxval(abs(motion%v(j, :)))
-         end do
-         where (.not. size_of > 0.0_wp) size_of = 1.0_wp
-      end function scales
-
    end subroutine one_step
 
    !> Slopes by the displacements (force, displacement), where one step has brought the unstrained

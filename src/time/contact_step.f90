@@ -75,9 +75,9 @@ contains
       allocate (self%state(structure%n_pairs), source=state_stick)
       allocate (self%slope(3, 3, structure%n_pairs), source=0.0_wp)
       call self%lu%reserve(n)
-      allocate (self%elements(size(structure%elements)))
+      allocate (self%elements(size(structure%kind)))
       do k = 1, size(self%elements)
-         associate (own => self%elements(k), kind => structure%elements(k))
+         associate (own => self%elements(k), kind => structure%kind(k))
             n = size(kind%row, 1)
             call reserve_motion(n, 1, kind%law%needs_scratch, own%motion)
             own%motion%wants_slopes = .true.
@@ -157,8 +157,8 @@ contains
          end if
       end do
       do k = 1, size(self%elements)
-         do i = 1, size(structure%elements(k)%row, 2)
-            call follow_element(structure%elements(k), i, self, self%elements(k))
+         do i = 1, size(structure%kind(k)%row, 2)
+            call follow_element(structure%kind(k), i, self, self%elements(k))
          end do
       end do
       ! A spring knows no states: its force is a function of s, and the mismatch its residual.
@@ -317,12 +317,12 @@ contains
             end do
          end do
          do k = 1, size(self%elements)
-            do i = 1, size(structure%elements(k)%row, 2)
-               do c = 1, size(structure%elements(k)%row, 1)
-                  r = structure%elements(k)%row(c, i)
+            do i = 1, size(structure%kind(k)%row, 2)
+               do c = 1, size(structure%kind(k)%row, 1)
+                  r = structure%kind(k)%row(c, i)
                   if (r == 0) cycle
-                  do d = 1, size(structure%elements(k)%row, 1)
-                     q = structure%elements(k)%row(d, i)
+                  do d = 1, size(structure%kind(k)%row, 1)
+                     q = structure%kind(k)%row(d, i)
                      if (q > 0) jacobian(r, :) = jacobian(r, :) + &
                                                  self%elements(k)%slope(c, d, i)*w(q, :)
                   end do
@@ -398,10 +398,10 @@ contains
       integer :: c, i, k, r
 
       do k = 1, size(self%elements)
-         do i = 1, size(structure%elements(k)%row, 2)
-            call follow_element(structure%elements(k), i, self, self%elements(k))
-            do c = 1, size(structure%elements(k)%row, 1)
-               r = structure%elements(k)%row(c, i)
+         do i = 1, size(structure%kind(k)%row, 2)
+            call follow_element(structure%kind(k), i, self, self%elements(k))
+            do c = 1, size(structure%kind(k)%row, 1)
+               r = structure%kind(k)%row(c, i)
                if (r == 0) cycle
                change = -self%mismatch(r)/(1.0_wp + w(r, r)* &
                                            max(self%elements(k)%slope(c, c, i), 0.0_wp))

@@ -1,6 +1,6 @@
-!> Integration over a period without contact, springs and elements only, by CVODE (Hindmarsh et al.
-!> 2005): Adams-Moulton formulas of variable order and step to tolerances near round-off, values at
-!> uniform instants from its dense output. For structures with a regular mass whose highest
+!> Integration over a period without contact, springs and other elements, by CVODE (Hindmarsh et
+!> al. 2005): Adams-Moulton formulas of variable order and step to tolerances near round-off, values
+!> at uniform instants from its dense output. For structures with a regular mass whose highest
 !> frequency is not far above that of the load; others go through fw_time_stepper.
 module fw_smooth_integration
    use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_funloc, c_int, &
@@ -15,14 +15,14 @@ module fw_smooth_integration
    use fsundials_nvector_mod, only: fn_vdestroy, fn_vgetarraypointer, n_vector
    use fsunlinsol_dense_mod, only: fsunlinsol_dense
    use fsunmatrix_dense_mod, only: fsundensematrix
-   use fw_instant_law, only: element_motion, reserve_motion
+   use fw_element_forces, only: element_forces
    use fw_interrupt, only: must_end
    use fw_kinds, only: i8, pi, wp
    use fw_linalg, only: lu_type
    use fw_load_waves, only: load_waves
    use fw_period_record, only: new_period_record, period_record
    use fw_periodic_state, only: period_map
-   use fw_time_structure, only: element_rows, time_structure
+   use fw_time_structure, only: time_structure
    implicit none (type, external)
    private
 
@@ -35,24 +35,24 @@ module fw_smooth_integration
    !> it bounds, are not too many.
    real(wp), parameter :: moderate_ratio = 200.0_wp
    integer(c_long), parameter :: max_steps = 1000000_c_long
+   !> Motions of a period that a law of a user may have no force for.
+   integer, parameter :: most_refusals = 200
 
-   !> In tau = omega t, with w = dx/dtau: dw/dtau = load - stiffness x - damping w - springs -
-   !> elements, all divided by the mass and omega**2, so that both halves of the state have one
-   !> unit.
+   !> In tau = omega t, with w = dx/dtau: dw/dtau = load - stiffness x - damping w - springs, all
+   !> divided by the mass and omega**2, so that both halves of the state have one unit.
    type :: acceleration_type
       integer :: n = 0
       !> Stiffness and damping (n, n), loads (n, n_columns) and rows of springs (n, n_springs).
       real(wp), allocatable :: stiffness(:, :), damping(:, :), load(:, :), springs(:, :)
-      !> Springs as they are: rows of B (n, n_springs) behind those of elements, coefficients and
-      !> powers.
+      !> Springs as they are: rows of B (n, n_springs), coefficients and powers.
       real(wp), allocatable :: rows(:, :), coefficient(:)
       integer, allocatable :: power(:)
-      !> Kinds of elements, and an instant of each.
-      type(element_rows), allocatable :: elements(:)
-      type(element_motion), allocatable :: motion(:)
-      real(wp) :: omega = 0.0_wp
       !> What the loads behind the third are; their frequency is in them.
       type(load_waves) :: waves
+      !> Elements that are neither pairs nor springs, if there are any, and the frequency, which
+      !> they are told.
+      type(element_forces), allocatable :: elements
+      real(wp) :: omega = 0.0_wp
    end type acceleration_type
 
    type, extends(period_map) :: smooth_integration
@@ -61,6 +61,8 @@ module fw_smooth_integration
       !> Observed quantities (n_observed, n_dof).
       real(wp), allocatable :: observe(:, :)
       type(period_record) :: record
+      !> What the law of an element said that ended the last period; blank: none did.
+      character(400) :: complaint = ''
    contains
       procedure :: integrate
    end type smooth_integration
@@ -111,7 +113,7 @@ contains
       type(acceleration_type), intent(out) :: acceleration
       type(lu_type) :: mass
       logical :: singular
-      integer :: k, w
+      integer :: w
 
       acceleration%n = structure%n_dof
       call mass%reserve(structure%n_dof)
@@ -130,13 +132,6 @@ contains
       acceleration%springs = structure%rows
       acceleration%coefficient = structure%coefficient
       acceleration%power = structure%power
-      acceleration%omega = omega
-      acceleration%elements = structure%elements
-      allocate (acceleration%motion(size(acceleration%elements)))
-      do k = 1, size(acceleration%elements)
-         call reserve_motion(size(acceleration%elements(k)%row, 1), 1, &
-                             acceleration%elements(k)%law%needs_scratch, acceleration%motion(k))
-      end do
       call solve_columns(mass, acceleration%stiffness)
       call solve_columns(mass, acceleration%damping)
       call solve_columns(mass, acceleration%load)
@@ -147,6 +142,16 @@ contains
       acceleration%damping = acceleration%damping/omega
       acceleration%load = acceleration%load/omega**2
       acceleration%springs = acceleration%springs/omega**2
+      acceleration%omega = omega
+      if (.not. allocated(structure%elements)) return
+      acceleration%elements = structure%elements
+      do w = 1, size(acceleration%elements%kind)
+         associate (kind => acceleration%elements%kind(w))
+            kind%push = kind%rows
+            call solve_columns(mass, kind%push)
+            kind%push = kind%push/omega**2
+         end associate
+      end do
    end subroutine divide_by_mass
 
    !> In place, column by column of a matrix.
@@ -185,45 +190,19 @@ contains
       do i = 1, n
          slope(n + 1:2*n) = slope(n + 1:2*n) - y(i)*a%stiffness(:, i) - y(n + i)*a%damping(:, i)
       end do
+      ! Rows of springs stand behind those of elements.
       k = size(a%rows, 2) - size(a%coefficient)
       do i = 1, size(a%coefficient)
          slope(n + 1:2*n) = slope(n + 1:2*n) - a%springs(:, k + i)*a%coefficient(i)* &
                             dot_product(a%rows(:, k + i), y(:n))**a%power(i)
       end do
-      do k = 1, size(a%elements)
-         do i = 1, size(a%elements(k)%row, 2)
-            call push(a, a%elements(k), a%motion(k), i, y, slope(n + 1:2*n))
-         end do
-      end do
       status = 0
+      if (.not. allocated(a%elements)) return
+      call a%elements%add(t, a%omega, y(:n), a%omega*y(n + 1:2*n), slope(n + 1:2*n))
+      ! Without a force for this motion CVODE tries a shorter step; what ends the run ends it here.
+      if (a%elements%status < 0) status = 1_c_int
+      if (a%elements%status > 0 .or. a%elements%n_refused > most_refusals) status = -1_c_int
    end function evaluate
-
-   !> What an element adds to the accelerations.
-   subroutine push(a, kind, motion, element, y, acceleration)
-      type(acceleration_type), intent(in) :: a
-      type(element_rows), intent(in) :: kind
-      type(element_motion), intent(inout) :: motion
-      integer, intent(in) :: element
-      !> Positions, and their rates by tau (2 n).
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(inout) :: acceleration(:)
-      integer :: c, r
-
-      motion%element = element
-      motion%u = 0.0_wp
-      motion%v = 0.0_wp
-      do c = 1, size(kind%row, 1)
-         r = kind%row(c, element)
-         if (r == 0) cycle
-         motion%u(c, 1) = dot_product(a%rows(:, r), y(:a%n))
-         motion%v(c, 1) = a%omega*dot_product(a%rows(:, r), y(a%n + 1:))
-      end do
-      call kind%law%act(motion)
-      do c = 1, size(kind%row, 1)
-         r = kind%row(c, element)
-         if (r > 0) acceleration = acceleration - a%springs(:, r)*motion%force(c, 1)
-      end do
-   end subroutine push
 
    !> One period from a state (displacements, velocities); see period_map.
    subroutine integrate(self, start, finish, range, done)
@@ -270,6 +249,10 @@ contains
          call fcvodefree(memory)
       end if
       finish = [y(:n), self%omega*y(n + 1:)]
+      self%complaint = ''
+      if (.not. done .and. allocated(acceleration%elements)) then
+         self%complaint = acceleration%elements%complaint
+      end if
       status = fsunlinsolfree(solver)
       call fsunmatdestroy(matrix)
       call fn_vdestroy(y_vector)

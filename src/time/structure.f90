@@ -8,6 +8,7 @@
 module fw_time_structure
    use fw_kinds, only: wp
    use fw_contact_data, only: contact_type, spring_type
+   use fw_element_forces, only: element_forces, new_element_forces
    use fw_element_group, only: element_group
    use fw_elements, only: element_list
    use fw_error, only: error_type, fatal_error, status_failure, status_input
@@ -63,11 +64,15 @@ module fw_time_structure
       class(pair_law), allocatable :: law
       logical, allocatable :: at_once(:)
       real(wp), allocatable :: depth(:)
-      !> Kinds of elements.
-      type(element_rows), allocatable :: elements(:)
+      !> Kinds of elements that midpoint steps take.
+      type(element_rows), allocatable :: kind(:)
       !> Springs: force coefficient * e**power (n_springs).
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
+      !> Elements that are neither, for motions that are smooth; not allocated where there are none.
+      !> Whether there are functions of a user among them, which midpoint steps do not take.
+      type(element_forces), allocatable :: elements
+      logical :: has_functions = .false.
       !> Projection on the directions with mass (n_dof, n_dof); not allocated where all have mass.
       real(wp), allocatable :: massive(:, :)
    contains
@@ -77,16 +82,17 @@ module fw_time_structure
 contains
 
    !> Prepare a model; `present` marks the components of the pairs that are in use (3, n_pairs).
-   subroutine new_time_structure(model, contact, springs, elements, present, self, error)
+   subroutine new_time_structure(model, contact, springs, present, self, error, elements)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
-      type(element_list), intent(in) :: elements
       logical, intent(in) :: present(:, :)
       type(time_structure), intent(out) :: self
       !> status_failure where the eigenvalues of the mass cannot be computed, status_input where
       !> elements cannot be integrated.
       type(error_type), allocatable, intent(out) :: error
+      !> Others, whose forces follow from the motion at the same instant (default: none).
+      type(element_list), intent(in), optional :: elements
 
       self%n_dof = model%n_dof
       self%n_pairs = contact%n_pairs
@@ -97,12 +103,24 @@ contains
       self%load = model%load_columns()
       self%waves = model%waves
       call take_pairs(contact, present, self)
-      allocate (self%elements(0))
-      call take_elements(elements, self)
+      allocate (self%kind(0))
+      call take_elements(self, elements)
       call take_springs(springs, self)
       call find_massless(self, error)
       if (.not. allocated(error)) call check_rates(self, error)
    end subroutine new_time_structure
+
+   !> What is neither pair nor spring.
+   subroutine take_elements(self, elements)
+      type(time_structure), intent(inout) :: self
+      type(element_list), intent(in), optional :: elements
+
+      if (.not. present(elements)) return
+      if (elements%n_elements() == 0) return
+      allocate (self%elements)
+      call new_element_forces(elements, self%n_dof, self%elements)
+      call take_kinds(elements, self)
+   end subroutine take_elements
 
    !> Components that an elastic law gives no stiffness transmit nothing and are left out.
    subroutine take_pairs(contact, present, self)
@@ -144,24 +162,26 @@ contains
    end subroutine take_pairs
 
    !> Rows of elements behind those of the pairs: their inputs. Functions of a user are left out.
-   subroutine take_elements(elements, self)
+   subroutine take_kinds(elements, self)
       type(element_list), intent(in) :: elements
       type(time_structure), intent(inout) :: self
       type(element_rows) :: kind
       class(force_law), allocatable :: law
       integer :: k
 
-      if (.not. allocated(elements%slot)) return
       do k = 1, size(elements%slot)
-         if (elements%slot(k)%group%n_elements == 0 .or. &
-             allocated(elements%slot(k)%group%function)) cycle
+         if (elements%slot(k)%group%n_elements == 0) cycle
+         if (allocated(elements%slot(k)%group%function)) then
+            self%has_functions = .true.
+            cycle
+         end if
          call elements%slot(k)%group%make_law(1, law)
          call as_instant_law(law, kind%law)
          if (.not. allocated(kind%law)) cycle
          call take_inputs(elements%slot(k)%group, self, kind%row)
-         self%elements = [self%elements, kind]
+         self%kind = [self%kind, kind]
       end do
-   end subroutine take_elements
+   end subroutine take_kinds
 
    !> Rows of the inputs of a kind.
    subroutine take_inputs(group, self, row)
@@ -197,12 +217,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: c, i, k
 
-      do k = 1, size(self%elements)
-         if (.not. self%elements(k)%law%takes_rates) cycle
-         do i = 1, size(self%elements(k)%row, 2)
-            do c = 1, size(self%elements(k)%row, 1)
-               if (self%elements(k)%row(c, i) == 0) cycle
-               if (.not. self%massless(self%elements(k)%row(c, i))) cycle
+      do k = 1, size(self%kind)
+         if (.not. self%kind(k)%law%takes_rates) cycle
+         do i = 1, size(self%kind(k)%row, 2)
+            do c = 1, size(self%kind(k)%row, 1)
+               if (self%kind(k)%row(c, i) == 0) cycle
+               if (.not. self%massless(self%kind(k)%row(c, i))) cycle
                call fatal_error(error, "case%analysis = 'time': element "//to_text(i)//' of '// &
                                 '&damper acts on a dof without mass; give the dof a mass, or '// &
                                 "use 'frf' or 'point'", status_input)

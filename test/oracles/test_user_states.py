@@ -291,7 +291,8 @@ def test_a_wrong_slope_of_a_step_is_told(tmp_path, library):
 
 
 @pytest.mark.parametrize(("key", "told"), [
-    ({"case": {"analysis": "time"}}, "laws of a user does not go with"),
+    ({"case": {"analysis": "time"}}, "states of a law of a user does not go with "
+                                     "case%analysis = 'time'"),
     ({"sweep": {"start": 1.1, "stability": True}}, "states of a law of a user does not go with "
                                                    "sweep%stability")])
 def test_what_states_do_not_go_with_is_said(tmp_path, library, key, told):
