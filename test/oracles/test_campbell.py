@@ -142,7 +142,7 @@ def test_loads_of_orders_are_scaled(tmp_path):
     ({"campbell": {"end": 0.01}}, "must be above start"),
     ({"campbell": {"order_scale": [1.0, 2.0]}}, "one for each of the 4 orders"),
     ({"model": {"rotation_speed": 1.0}}, "give campbell%start and end"),
-    ({"cyclic": {"mistuned": True, "n_modes": 2}}, "leave mistuned out")])
+    ({"cyclic": {"mistuned": True, "n_modes": 2}}, "along a line of the diagram")])
 def test_what_does_not_go_together_is_refused(tmp_path, change, words):
     small_sector(tmp_path / "model.h5")
     case = with_model(DIAGRAM)
