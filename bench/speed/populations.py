@@ -38,7 +38,8 @@ def with_rows(path: Path, n_rows: int, n_patterns: int) -> None:
         file["mistuning/rows"] = modes.T @ stiffness[inside] / theta[:, None]
         file["mistuning/row_omega"] = omega
         rng = np.random.default_rng(SEED)
-        file["mistuning/patterns"] = DEVIATION * rng.standard_normal((n_patterns, N_SECTORS, n_rows))
+        shape = (n_patterns, N_SECTORS, n_rows)
+        file["mistuning/patterns"] = DEVIATION * rng.standard_normal(shape)
 
 
 def main() -> None:

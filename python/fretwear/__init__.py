@@ -70,10 +70,10 @@ from .stress import Stress
 from .user_law import Law
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model",
-           "NodalDiameter", "OutputError", "Point", "Polynomial", "Population", "Result", "RunInterrupted", "RunStopped",
-           "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf", "mode",
-           "optimise", "population", "resonance", "run", "wear"]
+           "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model", "NodalDiameter",
+           "OutputError", "Point", "Polynomial", "Population", "Result", "RunInterrupted",
+           "RunStopped", "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf",
+           "mode", "optimise", "population", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:
