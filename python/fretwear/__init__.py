@@ -13,6 +13,8 @@ fretwear.analyses
     Runs of the library in this process.
 fretwear.steps
     A case frequency by frequency.
+fretwear.populations
+    Many disks whose blades differ at random.
 fretwear.design
     Optimisation and calibration of the parameters of a case.
 fretwear.result, fretwear.bifurcation
@@ -60,6 +62,7 @@ from .errors import (
 )
 from .mistuning import Mistuning
 from .model import ContactPairs, Model, Spring
+from .populations import Population, population
 from .result import Result
 from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
@@ -67,10 +70,10 @@ from .stress import Stress
 from .user_law import Law
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model",
-           "NodalDiameter", "OutputError", "Point", "Polynomial", "Result", "RunInterrupted",
+           "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model", "NodalDiameter",
+           "OutputError", "Point", "Polynomial", "Population", "Result", "RunInterrupted",
            "RunStopped", "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf",
-           "mode", "optimise", "resonance", "run", "wear"]
+           "mode", "optimise", "population", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -37,6 +37,7 @@ COMMANDS = {
     "optimise": ("design.optimise_command", "parameters that make a quantity smallest or largest"),
     "calibrate": ("design.calibrate_command", "parameters of a case from measured curves"),
     "explore": ("explore", "a page with sliders: curve, loops and flanks follow"),
+    "population": ("population_command", "many disks whose blades differ at random"),
     "study": ("study", "a parameter study on all local cores or a cluster"),
 }
 

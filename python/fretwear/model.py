@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arguments import array, dofs, text, whole
+from ._identity import digest
 from ._namelist import literal
 from ._native import Session, unread_parts
 from .elements import Elements, checked_elements, read_elements
@@ -533,6 +534,15 @@ class Model:
 
     #: The same, as results have it.
     save = to_hdf5
+
+    def identity(self) -> str:
+        """Hash of all that the model consists of."""
+        found: list[str | bytes] = []
+        for name, value in sorted({**self._datasets(), **self._spring_datasets()}.items()):
+            values = np.asarray(value)
+            found += [name, repr(values.shape), repr(values.tolist())
+                      if values.dtype.kind == "O" else np.ascontiguousarray(values).tobytes()]
+        return digest(found)
 
     def _spring_datasets(self) -> dict[str, NDArray[Any]]:
         """The springs as a model file has them."""

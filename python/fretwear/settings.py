@@ -86,8 +86,8 @@ class CaseGroup(TypedDict, total=False):
 
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
-    #: a sweep, one frequency, wear at one frequency, integration in time, natural frequencies, a
-    #: nonlinear mode, a resonance, a Campbell diagram, or many mistuned dis (default: 'frf')
+    #: a sweep, one frequency, wear, integration in time, natural frequencies, a nonlinear mode, a
+    #: resonance, a Campbell diagram, or many mistuned disks (default: 'frf')
     analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
                       "population"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)

@@ -150,7 +150,7 @@ contains
       call keys%open('case', 'title, kind of analysis, threads')
       call keys%bind(key('title', 'stands in the result file', &
                          absent='title of the model file, or name of the namelist'), self%title)
-      call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
+      call keys%bind_word(key('analysis', 'a sweep, one frequency, wear, '// &
                               'integration in time, natural frequencies, a nonlinear '// &
                               'mode, a resonance, a Campbell diagram, or many '// &
                               'mistuned disks'), &

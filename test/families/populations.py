@@ -18,7 +18,7 @@ Sectors without symmetry, 2 to 9 of them, engine orders from -N to 2 N, no joint
 blade frequencies up to 10 % on one to three random rows, beside what the sectors differ in anyhow:
 stiffness and mass of blades, matrices of single sectors. Judge: numpy, which solves the annulus of
 each disk densely at every row; between the rows, the sum over the modes of the annulus at 4,001
-frequencies. Equal: 1e-8 of the amplitude. Missed: a maximum that is 1e-6 higher than what was found.
+frequencies. Equal: 1e-8 of the amplitude. Missed: a maximum 1e-6 higher than what was found.
 """
 COUNT = 1000
 SMALL = range(12)
@@ -91,7 +91,7 @@ def trial(seed, program, folder):
     for pattern in patterns:
         disks.append(Disk(case, change | {"stiffness": change["stiffness"] + np.array(
             [stiffness(d) for d in pattern])}))
-    counts = {"kind": way, "notes": []} | {key: 0 for key in COLUMNS}
+    counts = {"kind": way, "notes": []} | dict.fromkeys(COLUMNS, 0)
     write(folder / "model.h5", case, parts)
     groups = {"case": {"analysis": "population"}, "model": {"source": "hdf5", "file": "model.h5"},
               "cyclic": {"engine_order": case["engine_order"], "mistuned": True},

@@ -18,6 +18,7 @@ from .found import plot_calibration, plot_optimum
 from .kinds import KINDS, Choices, Kind, fitting
 from .mission import plot_mission
 from .mode import plot_mode
+from .population import plot_population
 from .resonance import plot_resonance
 from .response import (
     Response,
@@ -36,6 +37,7 @@ __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "
            "plot_campbell", "plot_content", "plot_convergence", "plot_cycle", "plot_damping",
            "plot_envelope", "plot_flanks", "plot_force", "plot_harmonics",
            "plot_hysteresis", "plot_mission", "plot_mode", "plot_nodal_diameters", "plot_optimum",
+           "plot_population",
            "plot_resonance", "plot_response", "plot_responses", "plot_safe", "plot_sensitivity",
            "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",
            "read_damping", "read_response"]

@@ -18,6 +18,7 @@ from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
 from .mission import plot_mission
 from .mode import plot_mode
+from .population import plot_population
 from .resonance import plot_resonance
 from .response import plot_response
 from .sensitivity import plot_sensitivity
@@ -133,6 +134,8 @@ KINDS: dict[str, Kind] = {
                  lambda r, c: plot_safe(r, c.speed)),
     "campbell": Kind("Campbell diagram", _has("campbell/speed"),
                      lambda r, c: plot_campbell_result(r)),
+    "population": Kind("Amplification of many disks", _has("population/amplification"),
+                       lambda r, c: plot_population(r, c.observe)),
     "mode": Kind("Nonlinear mode", _is_mode, lambda r, c: plot_mode(r)),
     "backbone": Kind("Backbone of the mode", _is_mode, lambda r, c: plot_backbone(r, c.observe)),
     "resonance": Kind("Resonance over a parameter", _is_resonance, lambda r, c: plot_resonance(r)),
