@@ -19,9 +19,9 @@ from ._native import Session, unread_parts
 from .elements import Elements, checked_elements, read_elements
 from .errors import InputError, NotBuiltError, OutputError
 from .mistuning import Mistuning, read_mistuning
-from .speeds import read_speeds, speed_datasets
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
+from .speeds import read_speeds, speed_datasets
 from .stress import OF_PICTURES, Stress, read_stress
 from .user_law import Law
 

@@ -117,6 +117,7 @@ contains
       class(raw_model), intent(inout) :: self
       character(:), allocatable, intent(out) :: message
 
+      ! Either says all that grows: a power by both would be counted twice.
       if (allocated(self%speeds%value) .or. allocated(self%speeds%at)) then
          if (allocated(self%stiffness_rotation) .or. allocated(self%load_static_rotation)) then
             message = 'speed/value beside stiffness_rotation or load/static_rotation: must be '// &
@@ -128,6 +129,7 @@ contains
          end if
          return
       end if
+      ! Nodal diameters have matrices per square of the speed of their own.
       if (allocated(self%cyclic%nodal)) return
       if (allocated(self%stiffness_rotation)) then
          self%growth%stiffness = reshape(self%stiffness_rotation, &

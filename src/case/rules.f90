@@ -136,6 +136,7 @@ module fw_rules
    type(rule_type), parameter :: of_diagrams(*) = [ &
       rule_type(of_campbell, 'model%rotation_speed', 'give campbell%start and end'), &
       rule_type(of_population, "sweep%continuation = 'arclength'", "use 'natural'"), &
+      rule_type(of_population, 'sweep%parameter', 'sweep over the frequency'), &
       rule_type(of_population, 'sweep%refine = .true.', 'rows are not kept; leave it out'), &
       rule_type(of_population, 'output%histories', 'points are not kept; leave it out'), &
       rule_type(of_population, "contact%memory = 'carried'", "use 'assembly'")]

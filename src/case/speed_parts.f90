@@ -29,6 +29,7 @@ module fw_speed_parts
 
 contains
 
+   !> The speeds first: their number is the extent of no other part, but of the groups that follow.
    subroutine bind_parts(self, to)
       class(speed_parts), intent(inout) :: self
       class(part_source), intent(inout) :: to
@@ -57,7 +58,9 @@ contains
       class(speed_parts), intent(in) :: self
       !> That of the model: compared where it is there, filled where it is not.
       real(wp), allocatable, intent(inout) :: stiffness(:, :)
+      !> Takes the powers of stiffness and load, and between which speeds they hold.
       type(speed_growth), intent(inout) :: growth
+      !> What does not fit; not allocated where all does.
       character(:), allocatable, intent(out) :: message
       !> Round-off of what a program writes, of the largest entry.
       real(wp), parameter :: same = 1.0e-8_wp
@@ -113,6 +116,7 @@ contains
       symmetric = 0.5_wp*(matrix + transpose(matrix))
    end function symmetric
 
+   !> Whether there are speeds, in order, each with the same parts.
    pure subroutine check(self, message)
       class(speed_parts), intent(in) :: self
       character(:), allocatable, intent(out) :: message
@@ -131,6 +135,7 @@ contains
          message = 'speed/value without speed/0/stiffness or speed/0/static'
       end if
       if (allocated(message)) return
+      ! A polynomial goes through all of them or is none.
       do i = 1, m
          if ((allocated(self%at(i)%stiffness) .neqv. allocated(self%at(1)%stiffness)) .or. &
              (allocated(self%at(i)%static) .neqv. allocated(self%at(1)%static)) .or. &
@@ -141,6 +146,7 @@ contains
             return
          end if
       end do
+      ! A group that no speed is given for would not count.
       do i = m + 1, most_speeds
          if (allocated(self%at(i)%stiffness) .or. allocated(self%at(i)%static)) message = &
             'a group speed/'//to_text(i - 1)//', but '//to_text(m)//' values of speed/value'

@@ -300,7 +300,8 @@ contains
             end associate
             associate (name => case%model%observe_name(i)%text)
                ! Without its sector.
-               call append(table, trim(line)//'  '//name(:max(0, index(name, '@', back=.true.) - 1)))
+               call append(table, trim(line)//'  '// &
+                           name(:max(0, index(name, '@', back=.true.) - 1)))
             end associate
          end associate
       end do

@@ -167,6 +167,7 @@ contains
       call add_multiple(speed%coriolis, -i/np, conjugated, wave%mass)
       call add_multiple(speed%circulatory, -i/np, conjugated, wave%damping)
       if (speed%n_powers() == 0) return
+      ! x: square of the speed there.
       x = (middle/np)**2
       allocate (level, slope, mold=wave%mass)
       level = (0.0_wp, 0.0_wp)

@@ -132,7 +132,8 @@ contains
 
    end function names_to_put
 
-   !> `group/` of `group/part`, nothing of a part that stands alone.
+   !> `group/` of `group/part`, nothing of a part that stands alone. Messages that would list every
+   !> part were cut before they came to those that were meant.
    pure function group_of(name) result(group)
       character(*), intent(in) :: name
       character(:), allocatable :: group

@@ -317,6 +317,7 @@ contains
       if (abs(order - case%sweep%speed_order) > 0.0_wp) then
          call reader%refuse('sweep', 'speed_order', 'must be a plain number')
       else if (order > 0.0_wp) then
+         ! Polynomials in the speed hold between the speeds that they go through.
          speeds = case%sweep%range()/order
          associate (growth => case%model%cyclic%speed%growth)
             if (speeds(1) < (1.0_wp - round_off)*growth%lowest .or. &

@@ -65,6 +65,7 @@ contains
          call read_file(reader, directory, options, raw, error)
          if (allocated(error)) return
       end if
+      ! Before the order is asked for, which a stiffness at rest may have to give.
       call raw%find_growth(message)
       if (allocated(message)) call reader%refuse_model(message)
       n_dof = raw%order()
@@ -352,7 +353,7 @@ contains
    !> A speed that nothing depends on, or at which the model is not known.
    subroutine check_rotation(reader, speed, order, raw)
       type(reader_type), intent(inout) :: reader
-      !> Order: of a speed that follows the frequency, else 0.
+      !> [rad/s]; order: of a speed that follows the frequency, else 0.
       real(wp), intent(in) :: speed, order
       type(raw_model), intent(in) :: raw
 

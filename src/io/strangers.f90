@@ -251,6 +251,7 @@ contains
       integer :: range(2)
 
       range = [1 - self%n_sectors, self%n_sectors - 1]
+      ! A number beyond these would be read by nobody.
       select case (known)
       case ('K'); range = [0, self%n_sectors/2]
       case ('J'); range = [0, self%n_sectors - 1]

@@ -73,6 +73,7 @@ contains
          call require_diameter(model, k, error)
          if (.not. allocated(error)) call sector_at(model, k, nodal(k + 1), error)
          if (allocated(model%cyclic%speed) .and. .not. allocated(error)) then
+            ! Nothing is condensed at a speed that follows the frequency.
             call self%basis(k + 1)%keep_dofs(k, size(nodal(k + 1)%mass, 1), relative%at(k + 1))
             n_kept = max(n_kept, size(self%basis(k + 1)%kept))
             cycle
@@ -97,6 +98,7 @@ contains
       end do
       call number_coordinates(relative%n_coordinates, n_kept, self)
       do k = 0, n
+         ! Kept modes stand behind the relative coordinates.
          slot = [relative%slots(k), (relative%n_coordinates + i, &
                                      i=1, size(self%basis(k + 1)%kept))]
          if (allocated(model%cyclic%speed)) then

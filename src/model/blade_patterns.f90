@@ -1,5 +1,5 @@
-!> Patterns of blade frequencies: d_ja of every blade mode a of every sector j, each pattern in place
-!> of the frequencies of the model,
+!> Patterns of blade frequencies: d_ja of every blade mode a of every sector j, each pattern in
+!> place of the frequencies of the model,
 !>
 !>   dK_j = W^T diag(w_a^2 ((1 + s d_ja)^2 - 1)) W + what else the sectors have beside each other.
 module fw_blade_patterns
@@ -35,6 +35,7 @@ contains
       class(blade_patterns), intent(in) :: self
       !> From 1.
       integer, intent(in) :: pattern
+      !> Without frequencies, which those of the pattern stand in place of.
       type(deviation_type), intent(inout) :: deviation
       integer :: a, j
 
@@ -44,6 +45,7 @@ contains
                                self%row_omega(a)**2, row=self%rows(a, :))
          end do
       end do
+      ! Forms the matrices of all terms.
       call deviation%set_scale(self%scale)
    end subroutine add_pattern
 

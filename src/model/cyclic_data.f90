@@ -222,6 +222,7 @@ contains
       call take(self%circulatory, reduced%circulatory)
       if (allocated(self%stiffness)) then
          allocate (reduced%stiffness(size(t, 2), size(t, 2), size(self%stiffness, 3)))
+         ! Power by power: each is Hermitian.
          do p = 1, size(self%stiffness, 3)
             reduced%stiffness(:, :, p) = matmul(conjg(transpose(t)), &
                                                 matmul(self%stiffness(:, :, p), t))

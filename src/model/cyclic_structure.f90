@@ -582,6 +582,7 @@ contains
       end associate
       associate (b => self%basis(self%basis_of(h)))
          if (.not. allocated(b%speed)) return
+         ! Damping in proportion to it is small beside it.
          do j = 1, b%speed%n_powers()
             sums = sums + (state%omega/b%speed%order)**(2*j)* &
                    matmul(abs(b%speed%stiffness(:, :, j)), amplitude(:m))

@@ -88,6 +88,7 @@ contains
       associate (speed => self%cyclic%speed)
          rate = omega/speed%order
          if (allocated(speed%growth%stiffness)) then
+            ! Once: damping and hysteretic damping are in proportion to it.
             grown = 0.0_wp*model%stiffness
             call speed%growth%add_stiffness(even_powers(rate, speed%growth%n_powers()), grown)
             model%stiffness = model%stiffness + grown

@@ -19,7 +19,9 @@ contains
       integer, intent(in) :: harmonic
       !> Whether the conjugates of the basis act.
       logical, intent(in) :: conjugated
+      !> [rad/s]
       real(wp), intent(in) :: omega
+      !> Of the coordinates (m, m), (m).
       complex(wp), intent(inout) :: matrix(:, :), load(:)
 
       if (allocated(basis%circulatory) .and. harmonic == 0) matrix = matrix + &
@@ -35,6 +37,7 @@ contains
       logical, intent(in) :: conjugated
       real(wp), intent(in) :: omega
       complex(wp), intent(inout) :: matrix(:, :), load(:)
+      !> Speed and frequency of the harmonic [rad/s].
       real(wp) :: rate, s
 
       rate = omega/speed%order
@@ -62,6 +65,7 @@ contains
                                                  load_factor, q, derivative)
    end subroutine add_speed_slope
 
+   !> Every factor is a product of the speed and the frequency of the harmonic, which both follow.
    pure subroutine add_slope(speed, harmonic, conjugated, omega, load_factor, q, derivative)
       type(nodal_speed), intent(in) :: speed
       integer, intent(in) :: harmonic
@@ -115,6 +119,7 @@ contains
    !> Add factors times the powers of the stiffness.
    pure subroutine add_stiffness(speed, factors, conjugated, sum)
       type(nodal_speed), intent(in) :: speed
+      !> As many as there are powers.
       complex(wp), intent(in) :: factors(:)
       logical, intent(in) :: conjugated
       complex(wp), intent(inout) :: sum(:, :)

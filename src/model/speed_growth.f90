@@ -48,6 +48,7 @@ contains
       class(speed_growth), intent(in) :: self
       !> As many as there are powers, or more.
       real(wp), intent(in) :: factors(:)
+      !> Grows by them (n_dof, n_dof).
       real(wp), intent(inout) :: matrix(:, :)
       integer :: p
 
@@ -61,6 +62,7 @@ contains
    pure subroutine add_load(self, factors, vector)
       class(speed_growth), intent(in) :: self
       real(wp), intent(in) :: factors(:)
+      !> Grows by them (n_dof).
       real(wp), intent(inout) :: vector(:)
 
       if (.not. allocated(self%load)) return
@@ -68,6 +70,7 @@ contains
    end subroutine add_load
 
    !> Omega**2, Omega**4, .. (n).
+   !> The number of powers is that of the matrices; a speed of 0 makes all of them 0.
    pure function even_powers(speed, n) result(factors)
       real(wp), intent(in) :: speed
       integer, intent(in) :: n

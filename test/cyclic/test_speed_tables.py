@@ -32,7 +32,7 @@ def test_another_program(tmp_path, number):
 
 
 def polynomials(rng, case, n_powers):
-    """Stiffness and load for Omega**2, Omega**4, .. (n_powers, n, n), (n_powers, n), and at rest."""
+    """Stiffness and load for Omega**2, Omega**4, .. (n_powers, n, n), (n_powers, n); at rest."""
     stiffness = np.array(case["model"]["stiffness"])
     n = len(stiffness)
     grown = [0.5**p * rng.uniform(0.0, 1.0) * (stiffness + 0.3 * np.eye(n))
@@ -207,7 +207,8 @@ POINT = {"case": {"analysis": "point"}, "sweep": {"start": 0.8}, "harmonics": {"
     ({}, {"model": {"rotation_speed": 1.5}}, "must be one of these"),
     ({"speed/value": [0.5, 1.0]}, {}, "must be one of these"),
     ({}, {"case": {"analysis": "frf"}, "sweep": {"values": [0.8, 2.2], "start": None,
-                                                 "speed_order": 2}}, "known from 0.00000 to 1.00000 rad/s")])
+                                                 "speed_order": 2}},
+     "known from 0.00000 to 1.00000 rad/s")])
 def test_wrong_tables_are_refused_in_words(tmp_path, changes, groups, told):
     write_parts(tmp_path / "model.h5", broken(GOOD, **changes))
     case = with_model({key: POINT.get(key, {}) | groups.get(key, {}) for key in POINT | groups})
