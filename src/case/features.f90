@@ -111,6 +111,8 @@ contains
          asked = all(a /= [analysis_frf, analysis_point])
       case (of_population)
          asked = a == analysis_population
+      case ("case%analysis other than 'frf', 'point' or 'population'")
+         asked = all(a /= [analysis_frf, analysis_point, analysis_population])
       case ("case%analysis other than 'frf', 'point', 'resonance' or 'mode'")
          asked = all(a /= [analysis_frf, analysis_point, analysis_resonance, analysis_mode])
       case (of_campbell)

@@ -150,7 +150,7 @@ module fw_rules
       rule_type(matrices_alone, "case%analysis = 'time'", "use 'frf' or 'point'"), &
       rule_type(matrices_alone, "solver%kind = 'pseudo_time'", "use 'newton'"), &
       rule_type(matrices_alone, 'output%tail', 'take more n_harmonics'), &
-      rule_type('sweep%speed_order', "case%analysis other than 'frf' or 'point'", &
+      rule_type('sweep%speed_order', "case%analysis other than 'frf', 'point' or 'population'", &
                 'give model%rotation_speed'), &
       rule_type('sweep%speed_order', growing_stability, &
                 'leave stability out, or give model%rotation_speed, speed by speed'), &

@@ -8,6 +8,7 @@ import json
 import h5py
 import numpy as np
 import pytest
+from annulus import random_case
 from cases import read, run, with_model, write_parts
 from deviations import write
 from project import ROOT
@@ -109,6 +110,36 @@ def test_pairs_of_the_tuned_disk_are_alike(tmp_path):
     tuned = read(tmp_path / "case.h5")["population/tuned"]
     run(tmp_path, groups | {"contact": {"law": case["law"], "mu": float(mu.mean())}})
     assert np.abs(read(tmp_path / "case.h5")["population/tuned"] / tuned - 1.0).max() <= 1e3 * SAME
+
+
+@pytest.mark.parametrize("n_pairs", [0, 1])
+def test_disks_along_an_engine_order(tmp_path, n_pairs):
+    """A speed that follows the frequency, in the solution that disks without joints share too."""
+    rng = np.random.default_rng([61, n_pairs])
+    case = random_case(rng, n_sectors=5, n_pairs=n_pairs, engine_order=2)
+    parts = with_rows(rng, case)
+    patterns = 0.05 * rng.uniform(-1.0, 1.0, (2, 5, 2))
+    write(tmp_path / "model.h5", case, parts | {"patterns": patterns})
+    stiffness = np.array(case["model"]["stiffness"])
+    with h5py.File(tmp_path / "model.h5", "a") as file:
+        file["stiffness_rotation"] = 0.4 * stiffness
+        skew = 0.1 * rng.normal(size=stiffness.shape)
+        file["coriolis"] = skew - skew.T
+    groups = with_model({
+        "case": {"analysis": "population"}, "population": {"peaks": False},
+        "cyclic": {"engine_order": 2, "mistuned": True},
+        "sweep": {"start": 0.9, "end": 1.3, "n_points": 9, "speed_order": 2},
+        "solver": {"tolerance": 1e-12}, "harmonics": {"n_harmonics": 1}}) | (
+        {"contact": {"law": case["law"]}} if n_pairs else {})
+    run(tmp_path, groups)
+    found = read(tmp_path / "case.h5")["population/amplitude"]
+    del groups["population"]
+    groups["case"] = {"analysis": "frf"}
+    for k, pattern in enumerate(patterns):
+        run(tmp_path, groups | {"mistuning": {"frequency": pattern.ravel().tolist()}}, name="one")
+        rows = read(tmp_path / "one.h5")["coefficients"]
+        high = np.hypot(rows[:, 1], rows[:, 2]).reshape(len(rows), 5, -1).max(axis=(0, 1))
+        assert np.abs(found[k] / high - 1.0).max() <= 1e3 * SAME
 
 
 def test_patterns_of_a_sector_each_hold_for_all_rows(tmp_path):
