@@ -164,6 +164,9 @@ def test_blades_and_their_waves(wave: Result, folder: Path) -> None:
     column = disk.index("u6@0")
     assert axes.lines[-1].get_ydata() == pytest.approx(
         disk.sector_amplitude[:, :, column].max(axis=1))
+    best = int(disk["blades/largest"][:, column].argmax())
+    title = plot_content(disk, observe="u6@0").axes[0].get_title()
+    assert f"{disk.frequency[best]:.6g} Hz" in title
     bars = plot_content(disk, 1, "u6@0").axes[0].patches
     u = np.array([disk.sector(j)[1, 1, column] - 1j * disk.sector(j)[1, 2, column]
                   for j in range(n)])

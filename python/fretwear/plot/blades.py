@@ -58,13 +58,13 @@ def plot_content(source: Source, point: int | None = None, observe: str | None =
     source : Result or path
         Result with ``cyclic%mistuned``.
     point : int, optional
-        Solution point from 0; the one with the largest amplitude without it.
+        Solution point from 0; that of the largest amplitude of all sectors without it.
     observe : str, optional
         Observed quantity, of any sector; the first one without it.
     """
     result = _mistuned(source)
-    point = choose_point(result, None) if point is None else point
     column = _quantity(result, observe)
+    point = _largest(result, column) if point is None else point
     diameter, size = result["blades/nodal_diameter"], result["blades/content"][point, column]
     loaded = int(result["cyclic/nodal_diameter"][min(1, result.n_harmonics)])
     figure = new_figure()
@@ -85,6 +85,13 @@ def _mistuned(source: Source) -> Result:
         raise AbsentError(f"{result.name}: its sectors are alike: run the case with "
                           "cyclic%mistuned = .true.")
     return result
+
+
+def _largest(result: Result, column: int) -> int:
+    """Point of the largest amplitude of any sector; as of other pictures along wear."""
+    if "wear/depth" in result or not result.converged.any():
+        return choose_point(result, None)
+    return int(np.argmax(np.where(result.converged, result["blades/largest"][:, column], -np.inf)))
 
 
 def _quantity(result: Result, observe: str | None) -> int:

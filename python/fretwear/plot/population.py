@@ -52,6 +52,6 @@ def plot_population(result: Result, observe: str | int | None = None) -> Figure:
     axes.set_xlabel("largest amplitude / that of the tuned disk")
     axes.set_ylabel("disks below it [%]")
     tidy(axes)
-    axes.legend(frameon=False, fontsize=8, loc="lower right")
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
     figure.suptitle(f"Population: {names[column]}", fontsize=11)
     return figure
