@@ -229,6 +229,9 @@ class Model:
         2 to 4 rotation speeds [rad/s], each with the stiffness (n_dof, n_dof) there, or with a
         pair of it and of a static load (n_dof,); polynomials in the square of the speed go through
         them. In place of stiffness_rotation and static_rotation; K may be None then.
+    reduction : pair of floats, optional
+        Up to which frequency [Hz] the model was reduced to an accuracy, and the estimated error of
+        the stiffness of the joint there; runs beyond it are remarked on.
     observe : mapping, optional
         Name of every observed quantity, with a dof number, counted from 1, or with a row of
         factors (n_dof,). Every dof without it.
@@ -259,6 +262,7 @@ class Model:
                  load_table: ArrayLike | None = None, stress: Stress | None = None,
                  mistuning: Mistuning | None = None,
                  speeds: Mapping[float, Any] | None = None,
+                 reduction: tuple[float, float] | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
@@ -317,6 +321,8 @@ class Model:
             raise InputError("mistuning: is given without sectors, must have Sectors beside it")
         self.mistuning = (None if mistuning is None or self.sectors is None
                           else mistuning.checked(n, self.sectors.n_sectors))
+        if reduction is not None:
+            self._moved.update(zip(_REDUCTION, array("reduction", reduction, (2,)).reshape(2, 1)))
         #: Datasets of matrices at several speeds.
         self._speeds = {} if speeds is None else speed_datasets(speeds, n)
         self._observe = None if observe is None else _rows(observe, n)
@@ -485,6 +491,7 @@ class Model:
                     base_dof=found.get("base/dof"), base_direction=found.get("base/direction"),
                     load_table=found.get("load/table"), stress=read_stress(file),
                     mistuning=read_mistuning(file), speeds=read_speeds(file),
+                    reduction=_reduction_of(file),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -636,6 +643,7 @@ class Model:
 #: Matrices that are arguments of their own names.
 _MATRICES = ("coriolis", "structural_damping", "circulatory", "stiffness_unsymmetric",
              "damping_unsymmetric")
+_REDUCTION = ("reduction/frequency", "reduction/error")
 _SPRING = ("side_1", "side_2", "sector_2", "coefficient", "power")
 _CONTACT = tuple(f"contact/{name}" for name in (
     "side_1", "side_2", "sector_2", "mu", "gap", "area", "position", "patch"))
@@ -683,6 +691,13 @@ def _waves(harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]],
         found[int(n)] = (array(f"harmonic[{n}], cosine", cosine, (n_dof,)),
                          array(f"harmonic[{n}], sine", sine, (n_dof,)))
     return found
+
+
+def _reduction_of(file: h5py.File) -> tuple[float, float] | None:
+    if not all(name in file for name in _REDUCTION):
+        return None
+    frequency, error = (float(np.ravel(file[name][()])[0]) for name in _REDUCTION)
+    return frequency, error
 
 
 def _waves_of(file: h5py.File) -> dict[int, tuple[ArrayLike, ArrayLike]] | None:
