@@ -7,6 +7,7 @@ parameters not accepted, 5 file not written.
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from dataclasses import fields
@@ -14,7 +15,8 @@ from pathlib import Path
 
 from .. import __version__
 from .._words import HintingParser
-from .model import ReducedDisk, build_full, reduce_disk
+from .blades import find_blade
+from .model import ReducedDisk, build_full, reduce_disk, reduced_system
 from .model_file import write_model
 from .parameters import DiskParameters, ParameterError
 from .recovery import recovery_mesh
@@ -45,11 +47,16 @@ def _run(options: argparse.Namespace) -> int:
         raise FileNotFoundError(f"no folder to write {options.output} into")
     started = time.perf_counter()
     full = build_full(parameters)
-    model = reduce_disk(full)
+    system = reduced_system(full)
+    model = reduce_disk(full, system)
+    blade = find_blade(full, system.reduction, options.blade) if options.blade else None
     write_model(model, options.output, options.title,
-                recovery_mesh(full)[0] if options.mesh else None)
+                recovery_mesh(full)[0] if options.mesh else None, blade)
     if not options.quiet:
         _summary(model, len(full.free), options.output, time.perf_counter() - started)
+        if blade is not None:
+            print("frequencies of the blade alone [Hz]: " + ", ".join(
+                f"{omega / (2.0 * math.pi):.1f}" for omega in blade.omega))
     return 0
 
 
@@ -72,6 +79,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mesh", action="store_true",
                         help="also store the mesh and the displacement of its vertices, for "
                              "fretwear export where the generator is not at hand")
+    parser.add_argument("--blade", type=int, default=0, metavar="MODES",
+                        help="also store so many modes of the blade alone, and its matrices, by "
+                             "which blades may differ (&mistuning)")
     parser.add_argument("--title", help="title stored in the file")
     parser.add_argument("-q", "--quiet", action="store_true", help="no summary")
     parser.add_argument("--version", action="version", version=f"fretwear {__version__}")

@@ -170,9 +170,10 @@ def reduced_system(full: FullDisk) -> ReducedSystem:
         raise ParameterError(f"DiskParameters: {error}") from None
 
 
-def reduce_disk(full: FullDisk) -> ReducedDisk:
-    """Reduce to the coordinates of `reduced_system`."""
-    system, n, p = reduced_system(full), full.n_interface, full.parameters
+def reduce_disk(full: FullDisk, system: ReducedSystem | None = None) -> ReducedDisk:
+    """Reduce to the coordinates of `reduced_system`, which need not be found again."""
+    system = reduced_system(full) if system is None else system
+    n, p = full.n_interface, full.parameters
     sides = 2 * n + 1 + np.arange(6 * p.n_patches, dtype=np.int32).reshape(2, p.n_patches, 3)
     last = full.rows.shape[0]
     return ReducedDisk(

@@ -8,6 +8,7 @@ the gradients that scikit-fem provides.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,6 +21,7 @@ __all__ = ["Assembly", "FacetMeans", "facet_means"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Elements = NDArray[Any] | slice
 
 # Three Gauss points per direction: exact for mass and stiffness of a parallelepiped.
 INTEGRATION_ORDER = 5
@@ -56,20 +58,22 @@ class Assembly:
         """Number of nodes."""
         return self.nodes.shape[1]
 
-    def scalar_mass(self) -> sp.csr_array:
-        """Mass matrix of one displacement component [tonne], (n_nodes, n_nodes)."""
+    def scalar_mass(self, elements: Elements = slice(None)) -> sp.csr_array:
+        """Mass matrix of one displacement component [tonne], (n_nodes, n_nodes), of some elements
+        (a mask or numbers) or of all."""
         shape = np.array([np.broadcast_to(np.asarray(b[0]), self.weight.shape)
-                          for b in self._basis.basis]).transpose(1, 2, 0)
-        weighted = shape * (self.material.density * self.weight)[:, :, None]
-        return self._scatter(np.matmul(shape.transpose(0, 2, 1), weighted), 1)
+                          for b in self._basis.basis]).transpose(1, 2, 0)[elements]
+        weighted = shape * (self.material.density * self.weight[elements])[:, :, None]
+        return self._scatter(np.matmul(shape.transpose(0, 2, 1), weighted), 1, elements)
 
-    def stiffness(self) -> sp.csr_array:
-        """Linear elastic stiffness [N/mm], (3 n_nodes, 3 n_nodes)."""
+    def stiffness(self, elements: Elements = slice(None)) -> sp.csr_array:
+        """Linear elastic stiffness [N/mm], (3 n_nodes, 3 n_nodes), likewise."""
         lame, shear = _lame(self.material)
-        n_cells, n_points, _, n_local = self._grad.shape
-        flat = self._grad.reshape(n_cells, n_points, 3 * n_local)
+        gradients = self._grad[elements]
+        n_cells, n_points, _, n_local = gradients.shape
+        flat = gradients.reshape(n_cells, n_points, 3 * n_local)
         # products[e, i, a, j, b] = integral of d_i phi_a d_j phi_b
-        products = np.matmul(flat.transpose(0, 2, 1), flat * self.weight[:, :, None])
+        products = np.matmul(flat.transpose(0, 2, 1), flat * self.weight[elements][:, :, None])
         products = products.reshape(n_cells, 3, n_local, 3, n_local)
         trace = shear * np.einsum("eiaib->eab", products)
         cells = np.empty((n_cells, n_local, 3, n_local, 3))
@@ -77,7 +81,7 @@ class Assembly:
             for j in range(3):
                 cells[:, :, i, :, j] = lame * products[:, i, :, j] + shear * products[:, j, :, i]
             cells[:, :, i, :, i] += trace
-        return self._scatter(cells.reshape(n_cells, 3 * n_local, 3 * n_local), 3)
+        return self._scatter(cells.reshape(n_cells, 3 * n_local, 3 * n_local), 3, elements)
 
     def geometric_stiffness(self, displacement: Floats) -> sp.csr_array:
         """Stress stiffening by the linear elastic stress of a displacement field.
@@ -103,9 +107,10 @@ class Assembly:
         cells = np.matmul(flat.transpose(0, 2, 1), pulled.reshape(n_cells, 3 * n_points, n_local))
         return sp.csr_array(sp.kron(self._scatter(cells, 1), sp.identity(3)))
 
-    def _scatter(self, cells: Floats, n_components: int) -> sp.csr_array:
+    def _scatter(self, cells: Floats, n_components: int,
+                 elements: Elements = slice(None)) -> sp.csr_array:
         """Sum element matrices into a sparse matrix that is symmetric to the last bit."""
-        number = (n_components * self.cell_nodes[:, :, None] + np.arange(n_components))
+        number = (n_components * self.cell_nodes[elements][:, :, None] + np.arange(n_components))
         number = number.reshape(len(cells), -1)
         rows = np.repeat(number, number.shape[1], axis=1).ravel()
         columns = np.tile(number, (1, number.shape[1])).ravel()
