@@ -80,7 +80,8 @@ def test_the_file_serves_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str
     case = tmp_path / "case.nml"
     case.write_text("&case analysis = 'modes' /\n&model source = 'hdf5' file = 'disk.h5' /\n"
                     "&cyclic engine_order = 4 mistuned = .true. n_modes = 1 /\n"
-                    "&contact law = 'penalty' tangential_stiffness = 1e4 normal_stiffness = 1e4\n/\n")
+                    "&contact law = 'penalty' tangential_stiffness = 1e4\n"
+                    "   normal_stiffness = 1e4 /\n")
     found = {}
     for name, key in (("tuned", "scale=0"), ("rows", f"frequency={[DEVIATION] * 8}"),
                       ("stiffness", f"stiffness={[(1.0 + DEVIATION)**2 - 1.0] * 8}")):
