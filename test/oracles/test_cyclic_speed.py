@@ -119,7 +119,6 @@ def test_another_order_is_remarked(tmp_path, order, said):
 
 
 @pytest.mark.parametrize(("changes", "words"), [
-    ({"cyclic": {"mistuned": True}}, "does not go with cyclic%mistuned"),
     ({"model": {"modal_damping": 0.01}}, "does not go with model%modal_damping"),
     ({"model": {"rotation_speed": 0.3}}, "does not go with model%rotation_speed")])
 def test_what_does_not_go_is_refused(tmp_path, changes, words):
