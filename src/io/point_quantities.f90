@@ -323,8 +323,8 @@ contains
       if (any(self%sensitivity /= 0)) then
          call find_sensitivity(point, self%sensitivity, carried)
       else if (index(self%name, 'blades/') == 1) then
-         if (is_mistuned(case)) call blades_of(point, trim(self%name), &
-                                               case%model%cyclic%n_sectors, carried)
+         if (case%model%cyclic%is_mistuned) call blades_of( &
+            point, trim(self%name), case%model%cyclic%n_sectors, carried)
       else
          call values_of(point, self%name, carried)
       end if
