@@ -644,7 +644,7 @@ contains
       integer, intent(in) :: h
       real(wp), intent(in) :: amplitude(:)
       real(wp), intent(out) :: sums(:)
-      real(wp) :: largest(self%n_slots, self%n_slots), theta
+      real(wp) :: largest(self%n_slots, self%n_slots), entries(self%n_slots, self%n_slots), theta
       integer :: j, k, m
 
       m = self%n_slots
@@ -653,14 +653,16 @@ contains
       largest = 0.0_wp
       do k = 1, size(self%basis)
          associate (b => self%basis(k)%blocks)
-            largest = max(largest, abs(b(:m, :, 1)) + theta*abs(b(:m, :, 2)))
+            entries = abs(b(:m, :, 1)) + theta*abs(b(:m, :, 2))
          end associate
-         if (.not. allocated(self%basis(k)%speed)) cycle
-         associate (speed => self%basis(k)%speed)
-            do j = 1, speed%n_powers()
-               largest = largest + (state%omega/speed%order)**(2*j)*abs(speed%stiffness(:, :, j))
-            end do
-         end associate
+         if (allocated(self%basis(k)%speed)) then
+            associate (speed => self%basis(k)%speed)
+               do j = 1, speed%n_powers()
+                  entries = entries + (state%omega/speed%order)**(2*j)*abs(speed%stiffness(:, :, j))
+               end do
+            end associate
+         end if
+         largest = max(largest, entries)
       end do
       do j = 1, self%n_alike
          sums(self%coordinate(:, j)) = matmul(largest, amplitude(self%coordinate(:, j)))
