@@ -5,11 +5,10 @@ origin. Random disks are judged by the program itself on the annulus as one stru
 """
 import json
 
-import h5py
 import numpy as np
 import pytest
 from annulus import random_case
-from cases import read, run, with_model, write_parts
+from cases import read, run, run_reference
 from cyclic_cases import difference
 from deviations import annulus, draw, write
 from project import ROOT
@@ -27,14 +26,7 @@ SAME = 1e-11
 
 @pytest.mark.parametrize(("name", "number"), RUNS)
 def test_other_programs(tmp_path, name, number):
-    write_parts(tmp_path / "model.h5", REFERENCE[name]["file"])
-    wanted = REFERENCE[name]["runs"][number]
-    run(tmp_path, with_model(wanted["case"]))
-    with h5py.File(tmp_path / "case.h5") as file:
-        for row in wanted["expect"]:
-            values = np.array(row["value"])
-            error = np.abs(file[row["dataset"]][()] - values).max() / np.abs(values).max()
-            assert error <= row["limit"], row["dataset"]
+    run_reference(tmp_path, REFERENCE[name], number)
 
 
 def solve(folder, case, parts, omegas=(0.7, 1.3, 1.9), **more):

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from annulus import random_case
-from cases import read, run, with_model, write_parts
+from cases import read, run, run_reference, with_model, write_parts
 from deviations import draw, write
 from project import ROOT
 
@@ -21,14 +21,7 @@ ORDER = 3.0
 
 @pytest.mark.parametrize("number", range(len(REFERENCE["runs"])))
 def test_another_program(tmp_path, number):
-    write_parts(tmp_path / "model.h5", REFERENCE["file"])
-    wanted = REFERENCE["runs"][number]
-    run(tmp_path, with_model(wanted["case"]))
-    with h5py.File(tmp_path / "case.h5") as file:
-        for row in wanted["expect"]:
-            values = np.array(row["value"])
-            error = np.abs(file[row["dataset"]][()] - values).max() / np.abs(values).max()
-            assert error <= row["limit"], row["dataset"]
+    run_reference(tmp_path, REFERENCE, number)
 
 
 def polynomials(rng, case, n_powers):
@@ -100,52 +93,47 @@ def test_rows_along_an_order_are_points_of_their_speed(tmp_path, seed):
         assert np.abs(followed["coefficients"][i] - one).max() < EQUAL * size
 
 
-@pytest.mark.parametrize("mistuned", [False, True])
-def test_a_table_of_two_speeds_is_stiffening_by_the_square(tmp_path, mistuned):
-    rng = np.random.default_rng(5)
-    case = random_case(rng, n_sectors=5, n_pairs=1, engine_order=2)
+def by_both_ways(tmp_path, case, speeds, grown, load, groups):
+    """The case by matrices per square of the speed, and by a table that says the same."""
     stiffness = np.array(case["model"]["stiffness"])
-    grown, loads, _ = polynomials(rng, case, 1)
-    found = []
     for way in ("square", "table"):
         folder = tmp_path / way
         folder.mkdir()
         write(folder / "model.h5", case, {})
         if way == "table":
-            put_speeds(folder / "model.h5", stiffness, [0.2, 0.7], (grown, loads, 0.0 * loads[0]))
+            put_speeds(folder / "model.h5", stiffness, speeds,
+                       (grown[None], load[None], 0.0 * load))
         else:
             with h5py.File(folder / "model.h5", "a") as file:
-                file["stiffness_rotation"], file["load/static_rotation"] = grown[0], loads[0]
-        run(folder, with_model({
-            "case": {"analysis": "frf"}, "cyclic": {"engine_order": 2, "mistuned": mistuned},
-            "contact": {"law": "penalty"}, "sweep": {"values": [0.9, 1.5], "speed_order": 3},
-            "solver": {"tolerance": 1e-12}, "harmonics": {"n_harmonics": 3}}))
-        found.append(read(folder / "case.h5")["coefficients"])
-    assert np.abs(found[0] - found[1]).max() < EQUAL * np.abs(found[0]).max()
+                file["stiffness_rotation"], file["load/static_rotation"] = grown, load
+        run(folder, with_model(groups))
+        yield read(folder / "case.h5")
+
+
+@pytest.mark.parametrize("mistuned", [False, True])
+def test_a_table_of_two_speeds_is_stiffening_by_the_square(tmp_path, mistuned):
+    rng = np.random.default_rng(5)
+    case = random_case(rng, n_sectors=5, n_pairs=1, engine_order=2)
+    grown, loads, _ = polynomials(rng, case, 1)
+    square, table = by_both_ways(tmp_path, case, [0.2, 0.7], grown[0], loads[0], {
+        "case": {"analysis": "frf"}, "cyclic": {"engine_order": 2, "mistuned": mistuned},
+        "contact": {"law": "penalty"}, "sweep": {"values": [0.9, 1.5], "speed_order": 3},
+        "solver": {"tolerance": 1e-12}, "harmonics": {"n_harmonics": 3}})
+    size = np.abs(square["coefficients"]).max()
+    assert np.abs(square["coefficients"] - table["coefficients"]).max() < EQUAL * size
 
 
 def test_a_campbell_diagram_of_a_table(tmp_path):
     rng = np.random.default_rng(6)
     case = random_case(rng, n_sectors=6, n_pairs=0, engine_order=2)
-    stiffness = np.array(case["model"]["stiffness"])
     grown, _, _ = polynomials(rng, case, 1)
-    found = []
-    for way in ("square", "table"):
-        folder = tmp_path / way
-        folder.mkdir()
-        write(folder / "model.h5", case, {})
-        if way == "table":
-            nothing = np.zeros((1, len(stiffness)))
-            put_speeds(folder / "model.h5", stiffness, [0.0, 1.2], (grown, nothing, nothing[0]))
-        else:
-            with h5py.File(folder / "model.h5", "a") as file:
-                file["stiffness_rotation"] = grown[0]
-        run(folder, with_model({"case": {"analysis": "campbell"}, "campbell": {
-            "start": 0.1, "end": 1.1, "n_speeds": 6, "orders": [2, 3]}}))
-        found.append(read(folder / "case.h5"))
+    square, table = by_both_ways(
+        tmp_path, case, [0.0, 1.2], grown[0], np.zeros(len(grown[0])), {
+            "case": {"analysis": "campbell"}, "campbell": {
+                "start": 0.1, "end": 1.1, "n_speeds": 6, "orders": [2, 3]}})
     for name in ("campbell/open", "campbell/crossing/speed", "campbell/peak/amplitude"):
-        assert np.allclose(found[0][name], found[1][name], rtol=1e-8, equal_nan=True), name
-    assert len(found[0]["campbell/crossing/speed"]) > 0
+        assert np.allclose(square[name], table[name], rtol=1e-8, equal_nan=True), name
+    assert len(square["campbell/crossing/speed"]) > 0
 
 
 def test_the_branch_along_an_order_meets_its_points(tmp_path):

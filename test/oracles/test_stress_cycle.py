@@ -10,7 +10,7 @@ from itertools import pairwise
 import h5py
 import numpy as np
 import pytest
-from cases import run, with_model, write_parts
+from cases import run, run_reference, with_model, write_parts
 from project import ROOT
 from scipy.optimize import minimize
 
@@ -20,14 +20,7 @@ INSTANTS = 360
 
 @pytest.mark.parametrize("number", range(len(REFERENCE["runs"])))
 def test_sector_at_speed(tmp_path, number):
-    write_parts(tmp_path / "model.h5", REFERENCE["file"])
-    wanted = REFERENCE["runs"][number]
-    run(tmp_path, with_model(wanted["case"]))
-    with h5py.File(tmp_path / "case.h5") as file:
-        for row in wanted["expect"]:
-            values = np.array(row["value"])
-            error = np.abs(file[row["dataset"]][()] - values).max() / np.abs(values).max()
-            assert error <= row["limit"], row["dataset"]
+    run_reference(tmp_path, REFERENCE, number)
 
 
 def structure(seed, n_points, n_harmonics):

@@ -9,7 +9,8 @@ from project import PATIENT, PROGRAM
 from fretwear._namelist import literal
 from fretwear._namelist import write_namelist as namelist_text
 
-__all__ = ["literal", "merged", "read", "run", "with_model", "write_namelist", "write_parts"]
+__all__ = ["literal", "merged", "read", "run", "run_reference", "with_model", "write_namelist",
+           "write_parts"]
 
 
 def write_namelist(path, groups):
@@ -33,6 +34,20 @@ def with_model(groups):
     """The same with model.h5 beside it."""
     return {group: dict(keys) for group, keys in groups.items()} | {
         "model": {"source": "hdf5", "file": "model.h5"} | groups.get("model", {})}
+
+
+def run_reference(folder, reference, number):
+    """Run one case of a reference of another program, and want what it found within its limits,
+    relative to the largest; the result's path."""
+    write_parts(folder / "model.h5", reference["file"])
+    wanted = reference["runs"][number]
+    run(folder, with_model(wanted["case"]))
+    with h5py.File(folder / "case.h5") as file:
+        for row in wanted["expect"]:
+            values = np.array(row["value"])
+            error = np.abs(file[row["dataset"]][()] - values).max() / np.abs(values).max()
+            assert error <= row["limit"], row["dataset"]
+    return folder / "case.h5"
 
 
 def merged(groups, changes):
