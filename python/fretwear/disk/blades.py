@@ -15,7 +15,7 @@ from .mesh import DISK
 from .model import FullDisk
 from .parameters import ParameterError
 
-__all__ = ["Blade", "find_blade"]
+__all__ = ["Blade", "BladeModes", "blade_modes", "find_blade"]
 
 Floats = NDArray[np.float64]
 
@@ -50,8 +50,29 @@ class Blade:
                 "mistuning/blade_stiffness": self.stiffness, "mistuning/blade_mass": self.mass}
 
 
+@dataclass(frozen=True)
+class BladeModes:
+    """The blade on the free degrees of freedom of the sector: those off the disk, the eigenvalues
+    and shapes (n_inside, n_modes) of mass 1 with the root held, its stiffness and mass (n, n)."""
+
+    inside: NDArray[np.intp]
+    squares: Floats
+    shapes: Floats
+    stiffness: sp.csr_array
+    mass: sp.csr_array
+
+
 def find_blade(full: FullDisk, reduction: Reduction, n_modes: int) -> Blade:
-    """Blade modes of a sector, and its matrices in the coordinates of a reduction.
+    """Blade modes of a sector, and its matrices in the coordinates of a reduction; errors are those
+    of `blade_modes`."""
+    modes = blade_modes(full, n_modes)
+    rows = sp.csr_array((modes.stiffness[modes.inside].T @ modes.shapes / modes.squares).T)
+    return Blade(reduction.row(rows), np.sqrt(modes.squares), reduction.matrix(modes.stiffness),
+                 reduction.matrix(modes.mass))
+
+
+def blade_modes(full: FullDisk, n_modes: int) -> BladeModes:
+    """Lowest modes of the blade with its shroud, held where it stands on the disk.
 
     Raises
     ------
@@ -75,6 +96,4 @@ def find_blade(full: FullDisk, reduction: Reduction, n_modes: int) -> Blade:
     squares, shapes = squares[order], shapes[:, order]
     # The sign of a mode is free: its largest entry is positive.
     shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(n_modes)])
-    rows = sp.csr_array((stiffness[inside].T @ shapes / squares).T)
-    return Blade(reduction.row(rows), np.sqrt(squares), reduction.matrix(stiffness),
-                 reduction.matrix(mass))
+    return BladeModes(inside, squares, shapes, stiffness, mass)
