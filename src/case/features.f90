@@ -51,9 +51,10 @@ contains
    !> Whether there is such a phrase: a rule with another one would never hold.
    logical function knows_feature(phrase)
       character(*), intent(in) :: phrase
-      type(case_type) :: case
+      class(case_type), allocatable :: case
       logical :: asked
 
+      allocate (case)
       allocate (case%model%load_cosine(0), case%model%load_sine(0))
       call look_up(case, phrase, asked, knows_feature)
    end function knows_feature

@@ -19,7 +19,7 @@ module fw_analysis
    implicit none (type, external)
    private
 
-   public :: analysis, run_type
+   public :: analysis, build_only, run_type
 
    !> A run at work; not to be moved once it has begun.
    type :: run_type

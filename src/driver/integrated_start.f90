@@ -50,7 +50,7 @@ contains
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
       type(time_strategy), allocatable :: integration
-      type(case_type) :: fast
+      class(case_type), allocatable :: fast
       type(point_request) :: bare
       type(point_type) :: point
 
@@ -84,9 +84,9 @@ contains
    subroutine case_of_integration(case, level, fast)
       type(case_type), intent(in) :: case
       type(level_type), intent(in) :: level
-      type(case_type), intent(out) :: fast
+      class(case_type), allocatable, intent(out) :: fast
 
-      fast = case
+      allocate (fast, source=case)
       fast%harmonics%n_harmonics = max(1, case%model%waves%highest())
       fast%solver%fallback = .false.
       fast%solver%tolerance = close_enough

@@ -28,9 +28,9 @@ module fw_level
 
    type :: level_type
       type(harmonics_options) :: harmonics
-      type(balance_problem) :: problem
+      class(balance_problem), allocatable :: problem
       !> Of the problem: levels are not copied once they are built.
-      type(balance_state) :: system
+      class(balance_state), allocatable :: system
       class(point_solver), allocatable :: solver
       !> Where on the path was solved last, if anywhere, and the observed coefficients there.
       logical :: is_solved = .false.
@@ -112,6 +112,7 @@ contains
       if (self%is_built) return
       self%harmonics = case%harmonics%with_harmonics(n_harmonics)
       if (present(doublings)) self%harmonics%doublings = doublings
+      if (.not. allocated(self%problem)) allocate (self%problem, self%system)
       call build_system(case, self%problem, self%system, error, of_level=self%harmonics, held=held)
       if (allocated(error)) return
       allocate (self%solver)

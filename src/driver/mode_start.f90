@@ -32,10 +32,10 @@ module fw_mode_start
    !> Everything that a curve needs; not to be moved once it is built.
    type :: mode_start
       !> The case, as the structure of a mode is built from it.
-      type(case_type) :: case
-      type(balance_problem) :: problem
-      type(balance_state) :: balance
-      type(mode_system) :: system
+      class(case_type), allocatable :: case
+      class(balance_problem), allocatable :: problem
+      class(balance_state), allocatable :: balance
+      class(mode_system), allocatable :: system
       !> Number among the elastic modes with stuck pairs.
       integer :: number = 0
       !> Frequency and self-excitation there [rad/s].
@@ -69,7 +69,8 @@ contains
       type(stuck_modes) :: modes
       real(wp), allocatable :: x(:)
 
-      self%case = case
+      allocate (self%problem, self%balance, self%system)
+      allocate (self%case, source=case)
       self%case%sweep%start = rough_frequency(case)
       call check_size(case, error)
       if (.not. allocated(error)) call at_rest(self, x, modes, error)

@@ -7,7 +7,7 @@
 module fw_moved_parameter
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state, parameter_mover
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_case_forces, only: new_forces
    use fw_contact_data, only: contact_type, spring_type
    use fw_elements, only: element_list
@@ -22,7 +22,7 @@ module fw_moved_parameter
    implicit none (type, external)
    private
 
-   public :: moved_parameter, new_moved_parameter
+   public :: moved_parameter
 
    type, extends(parameter_mover) :: moved_parameter
       !> As in fw_parameters.
@@ -31,15 +31,19 @@ module fw_moved_parameter
       logical :: by_factor = .false.
       !> Values of the case as it was read: one, or one for each element.
       real(wp), allocatable :: base(:)
-      !> The case at the present value: pairs and springs, and the rest where matrices change; none
-      !> of it for loads.
-      type(case_type) :: case
+      !> What vibrates, at the present value: pairs and springs, and the rest where matrices change;
+      !> none of it for loads.
+      class(body_type), allocatable :: body
+      !> As in harmonics_options; the frequency where the case begins [rad/s].
+      integer :: filter_harmonics = 0
+      real(wp) :: first = 0.0_wp
       !> The eps of rigid laws stays where matrices change, so that a residual has the slope that
       !> `derive` gives.
       logical :: holds_eps = .false.
       !> What the problem was built with.
       real(wp), allocatable :: built(:)
    contains
+      procedure :: take
       procedure :: apply
       procedure :: change
       procedure :: derive
@@ -50,28 +54,28 @@ module fw_moved_parameter
 contains
 
    !> A parameter of a case, which the case has (fw_parameter_checks).
-   function new_moved_parameter(case, number, by_factor) result(self)
-      type(case_type), intent(in) :: case
+   subroutine take(self, body, number, by_factor)
+      class(moved_parameter), intent(inout) :: self
+      class(body_type), intent(in) :: body
       integer, intent(in) :: number
       logical, intent(in) :: by_factor
-      type(moved_parameter) :: self
 
       self%number = number
       self%by_factor = by_factor
-      call get_parameter(case, number, self%base)
+      call get_parameter(body, number, self%base)
       self%built = self%base
       if (is_of_matrices(number)) then
-         self%case = case
+         allocate (self%body, source=body)
       else if (.not. is_of_loads(number)) then
          ! Loads are moved by factors of the state, all else by other laws or matrices. Matrices
          ! are large, and stay.
-         self%case%contact = case%contact
-         self%case%springs = case%springs
-         self%case%elements = case%elements
-         self%case%harmonics%filter_harmonics = case%harmonics%filter_harmonics
-         if (is_of_sectors(number)) self%case%model%cyclic%deviation = case%model%cyclic%deviation
+         allocate (self%body)
+         self%body%contact = body%contact
+         self%body%springs = body%springs
+         self%body%elements = body%elements
+         if (is_of_sectors(number)) self%body%model%cyclic%deviation = body%model%cyclic%deviation
       end if
-   end function new_moved_parameter
+   end subroutine take
 
    !> What the parameter is at a value or factor, each pair or spring its own.
    pure function values_at(self, value) result(values)
@@ -90,7 +94,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. is_of_loads(self%number)) then
-         call put_parameter(self%case, self%number, self%values_at(value), error)
+         call put_parameter(self%body, self%number, self%values_at(value), error)
          if (allocated(error)) return
       end if
       call self%change(state, value, error)
@@ -109,13 +113,13 @@ contains
          else if (self%number == static_scale) then
             call state%set_load_factors(factor(1), state%load_factor(static=.false.))
          else if (is_of_matrices(self%number)) then
-            call move_structure(self%case, self%holds_eps, state, error)
+            call move_structure(self%body%model, self%first, self%holds_eps, state, error)
          else if (is_of_sectors(self%number)) then
-            call state%problem%structure%take_deviation(self%case%model%cyclic%deviation)
+            call state%problem%structure%take_deviation(self%body%model%cyclic%deviation)
             call state%renew_structure(error)
          else
-            call renew_laws(state%problem, self%case%contact, self%case%springs, &
-                            self%case%elements, self%case%harmonics%filter_harmonics)
+            call renew_laws(state%problem, self%body%contact, self%body%springs, &
+                            self%body%elements, self%filter_harmonics)
             call state%renew_workspaces()
          end if
       end associate
@@ -197,7 +201,7 @@ contains
       values = self%values_at(value)
       entry%number = self%number
       if (is_of_matrices(self%number)) then
-         entry%change = findloc(self%case%model%changes%parameter, self%number, dim=1)
+         entry%change = findloc(self%body%model%changes%parameter, self%number, dim=1)
       end if
       do i = 1, size(values)
          entry%value = values(i)

@@ -7,9 +7,10 @@
 module fw_moved_structure
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_model, only: model_type
    use fw_parameter_values, only: put_parameter
    use fw_plain_structure, only: new_plain_structure, plain_structure
    use fw_reduction, only: may_resonate_between, new_reduction, reduction_type
@@ -18,41 +19,40 @@ module fw_moved_structure
    implicit none (type, external)
    private
 
-   public :: fullest_case, meets_modes, move_structure
+   public :: meets_modes, move_structure, put_fullest
 
 contains
 
-   !> The case at the largest of its values: loads and matrices that vanish elsewhere are there, and
-   !> with them the harmonics and the coordinates that all values need.
-   subroutine fullest_case(case, fullest, error)
-      type(case_type), intent(in) :: case
-      type(case_type), intent(out) :: fullest
+   !> Bring a body to the largest of its values: loads and matrices that vanish elsewhere are there,
+   !> and with them the harmonics and the coordinates that all values need.
+   subroutine put_fullest(body, error)
+      class(body_type), intent(inout) :: body
       type(error_type), allocatable, intent(out) :: error
+      real(wp) :: largest
 
-      fullest = case
-      associate (span => case%varied_span)
-         call put_parameter(fullest, case%varied, &
-                            [merge(span(1), span(2), abs(span(1)) > abs(span(2)))], error)
+      associate (span => body%varied_span)
+         largest = merge(span(1), span(2), abs(span(1)) > abs(span(2)))
       end associate
-   end subroutine fullest_case
+      call put_parameter(body, body%varied, [largest], error)
+   end subroutine put_fullest
 
    !> Whether a mode that the contact holds may be met between the ends of the values.
-   subroutine meets_modes(case, relative, harmonic, range, meets, error)
-      type(case_type), intent(in) :: case
+   subroutine meets_modes(body, relative, harmonic, range, meets, error)
+      class(body_type), intent(in) :: body
       type(relative_type), intent(in) :: relative
       integer, intent(in) :: harmonic(:)
       !> [rad/s]
       real(wp), intent(in) :: range(2)
       logical, intent(out) :: meets
       type(error_type), allocatable, intent(out) :: error
-      type(case_type) :: moved
+      class(body_type), allocatable :: moved
       type(reduction_type) :: basis(2)
       integer :: k
 
       meets = .false.
-      moved = case
+      allocate (moved, source=body)
       do k = 1, 2
-         call put_parameter(moved, case%varied, case%varied_span(k:k), error)
+         call put_parameter(moved, body%varied, body%varied_span(k:k), error)
          if (allocated(error)) return
          call new_reduction(moved%model, relative, harmonic, range, basis(k), error, &
                             keep_none=.true.)
@@ -61,10 +61,12 @@ contains
       meets = may_resonate_between(basis(1), basis(2), harmonic, range)
    end subroutine meets_modes
 
-   !> Bring the structure of a state's problem to the matrices of the case. Rigid laws take their
-   !> eps from it, as a case of its own would, unless they are to hold it.
-   subroutine move_structure(case, holds_eps, state, error)
-      type(case_type), intent(in) :: case
+   !> Bring the structure of a state's problem to the matrices of a model. Rigid laws take their eps
+   !> from it, as a case of its own would, unless they are to hold it.
+   subroutine move_structure(model, first, holds_eps, state, error)
+      type(model_type), intent(in) :: model
+      !> The frequency where the case begins [rad/s].
+      real(wp), intent(in) :: first
       logical, intent(in) :: holds_eps
       class(balance_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
@@ -75,12 +77,12 @@ contains
          scales = .not. (holds_eps .or. problem%origin%borrows_laws)
          if (scales) scales = take_balance(problem)
          if (scales .or. .not. problem%origin%keeps_all) then
-            call take_structure(case, .false., problem, error)
+            call take_structure(model, .false., problem, error)
             if (allocated(error)) return
          end if
-         if (scales) call scale_laws(case, problem, error)
+         if (scales) call scale_laws(first, problem, error)
          if (allocated(error)) return
-         if (problem%origin%keeps_all) call take_structure(case, .true., problem, error)
+         if (problem%origin%keeps_all) call take_structure(model, .true., problem, error)
          if (allocated(error)) return
       end associate
       call state%renew_workspaces()
@@ -94,9 +96,9 @@ contains
       take_balance = problem%forces%entry(problem%forces%pairs)%law%prediction%takes_balance
    end function take_balance
 
-   !> Condense the matrices of the case, or take all of their modes.
-   subroutine take_structure(case, keeps_all, problem, error)
-      type(case_type), intent(in) :: case
+   !> Condense the matrices of a model, or take all of their modes.
+   subroutine take_structure(model, keeps_all, problem, error)
+      type(model_type), intent(in) :: model
       logical, intent(in) :: keeps_all
       type(balance_problem), intent(inout) :: problem
       type(error_type), allocatable, intent(out) :: error
@@ -104,11 +106,11 @@ contains
 
       allocate (plain)
       if (keeps_all) then
-         call new_plain_structure(case%model, problem%joint%relative, problem%fourier%harmonic, &
+         call new_plain_structure(model, problem%joint%relative, problem%fourier%harmonic, &
                                   problem%origin%range, plain, error, keep_all=.true., &
                                   held=problem%origin%basis)
       else
-         call new_plain_structure(case%model, problem%joint%relative, problem%fourier%harmonic, &
+         call new_plain_structure(model, problem%joint%relative, problem%fourier%harmonic, &
                                   problem%origin%range, plain, error, &
                                   keep_none=.not. problem%origin%keeps_all)
       end if
@@ -117,14 +119,14 @@ contains
    end subroutine take_structure
 
    !> eps of the structure as it is, at the frequency where the case begins.
-   subroutine scale_laws(case, problem, error)
-      type(case_type), intent(in) :: case
+   subroutine scale_laws(first, problem, error)
+      real(wp), intent(in) :: first
       type(balance_problem), intent(inout) :: problem
       type(error_type), allocatable, intent(out) :: error
       class(structure_state), allocatable :: stand
 
       call problem%structure%new_state(stand)
-      call problem%structure%at(stand, case%sweep%start, 0.0_wp, error)
+      call problem%structure%at(stand, first, 0.0_wp, error)
       if (.not. allocated(error)) call problem%scale_forces(stand, problem%origin%range(2))
    end subroutine scale_laws
 

@@ -189,7 +189,7 @@ contains
       integer, intent(inout) :: work
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
-      type(case_type) :: easier
+      class(case_type), allocatable :: easier
       type(level_type), pointer :: last, next
       real(wp), allocatable :: scales(:)
       logical :: rigid
@@ -202,9 +202,9 @@ contains
       end associate
       scales = softer
       if (rigid) scales = other_eps
+      allocate (easier, source=case)
       do k = 1, size(scales)
          if (work >= most_work) exit
-         easier = case
          if (rigid) then
             easier%contact%penalty_scale = scales(k)*case%contact%penalty_scale
          else

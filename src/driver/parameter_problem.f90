@@ -3,6 +3,7 @@
 module fw_parameter_problem
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state, new_balance_state
+   use fw_body, only: body_type
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
@@ -13,8 +14,10 @@ module fw_parameter_problem
 
    public :: parameter_problem, renew_state
 
-   !> Its case is the whole one, at the present value.
+   !> All of it stands at the present value; not to be copied once it is started.
    type, extends(moved_parameter) :: parameter_problem
+      !> The whole case, of which the body is a part.
+      type(case_type), pointer :: case => null()
       !> Present value or factor.
       real(wp) :: value = 0.0_wp
       !> Counts changes: what was made of an earlier problem has to be made anew.
@@ -33,8 +36,12 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: number
       logical, intent(in) :: by_factor
+      class(case_type), allocatable :: whole
 
-      self%case = case
+      allocate (whole, source=case)
+      call hold(whole, self%case, self%body)
+      self%first = case%sweep%start
+      self%filter_harmonics = case%harmonics%filter_harmonics
       self%number = number
       self%by_factor = by_factor
       call get_parameter(case, number, self%base)
@@ -43,13 +50,23 @@ contains
       if (.not. by_factor) self%value = self%base(1)
    end subroutine start
 
+   !> The case becomes the body, and has a name of its own there.
+   subroutine hold(whole, case, body)
+      class(case_type), allocatable, target, intent(inout) :: whole
+      type(case_type), pointer, intent(out) :: case
+      class(body_type), allocatable, intent(out) :: body
+
+      case => whole
+      call move_alloc(whole, body)
+   end subroutine hold
+
    !> Bring the case to a value before anything is built of it.
    subroutine begin(self, value, error)
       class(parameter_problem), intent(inout) :: self
       real(wp), intent(in) :: value
       type(error_type), allocatable, intent(out) :: error
 
-      call put_parameter(self%case, self%number, self%values_at(value), error)
+      call put_parameter(self%body, self%number, self%values_at(value), error)
       if (allocated(error)) return
       self%value = value
       self%built = self%values_at(value)
@@ -65,7 +82,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (abs(value - self%value) <= 0.0_wp) return
-      call put_parameter(self%case, self%number, self%values_at(value), error)
+      call put_parameter(self%body, self%number, self%values_at(value), error)
       if (allocated(error)) return
       self%value = value
       self%version = self%version + 1

@@ -14,8 +14,8 @@ module fw_problem
       method_tcm_least_squares, parity_all, parity_odd, sampling_auto, sampling_events
    use fw_joint, only: joint_type, new_joint, turn_joint
    use fw_memory, only: require_memory
-   use fw_moved_parameter, only: moved_parameter, new_moved_parameter
-   use fw_moved_structure, only: fullest_case, meets_modes, move_structure
+   use fw_moved_parameter, only: moved_parameter
+   use fw_moved_structure, only: meets_modes, move_structure, put_fullest
    use fw_parameter_sweep, only: as_factor
    use fw_parameters, only: gap, harmonic_scale, is_of_matrices
    use fw_plain_structure, only: new_plain_structure, plain_structure
@@ -65,11 +65,11 @@ contains
       !> left for other problems of the case.
       type(held_basis), intent(inout), optional :: held
       class(structure_state), allocatable :: stand
-      type(case_type), allocatable :: fullest
+      class(case_type), allocatable :: fullest
 
       if (is_of_matrices(case%varied)) then
-         allocate (fullest)
-         call fullest_case(case, fullest, error)
+         allocate (fullest, source=case)
+         call put_fullest(fullest, error)
          if (allocated(error)) return
          call build_problem(fullest, problem, stand, error, keep_all, of_level, forces, held)
       else
@@ -78,7 +78,7 @@ contains
       if (allocated(error)) return
       call new_balance_state(problem, system, stand)
       if (allocated(fullest) .and. .not. case%over%is_wanted()) then
-         call move_structure(case, .false., system, error)
+         call move_structure(case%model, case%sweep%start, .false., system, error)
          if (allocated(error)) return
       end if
       call let_move(case, system, error)
@@ -94,7 +94,9 @@ contains
 
       if (case%over%is_wanted()) then
          allocate (mover)
-         mover = new_moved_parameter(case, case%over%number, case%over%as == as_factor)
+         call mover%take(case%body_type, case%over%number, case%over%as == as_factor)
+         mover%first = case%sweep%start
+         mover%filter_harmonics = case%harmonics%filter_harmonics
          if (is_of_matrices(case%over%number)) call mover%apply(system, case%over%start, error)
          if (allocated(error)) return
          ! Along a branch the residual is to have the slope that is known of it: with the eps of the
@@ -103,7 +105,7 @@ contains
       end if
       if (case%control%is_wanted()) then
          allocate (load)
-         load = new_moved_parameter(case, harmonic_scale, .false.)
+         call load%take(case%body_type, harmonic_scale, .false.)
          call move_alloc(load, system%moved%mover)
          if (allocated(mover)) then
             allocate (system%along)

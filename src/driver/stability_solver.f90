@@ -117,12 +117,12 @@ contains
       if (system%goes_along()) then
          select type (mover => system%along%mover)
          type is (moved_parameter)
-            model = mover%case%model
+            model = mover%body%model
          end select
       else
          select type (mover => system%moved%mover)
          type is (moved_parameter)
-            model = mover%case%model
+            model = mover%body%model
          end select
       end if
    end function moved_model

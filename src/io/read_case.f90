@@ -373,13 +373,14 @@ contains
    subroutine list_keys(keys)
       type(record_list), intent(out) :: keys
       type(reader_type) :: reader
-      type(case_type) :: case
+      class(case_type), allocatable :: case
       type(string_type) :: none(0)
       type(error_type), allocatable :: ignored
 
       call new_reader(reader, '', '', none, ignored)
       ! What an empty input lacks is an error that nobody asks for; the keys are on record all the
       ! same.
+      allocate (case)
       call read_keys(reader, '', case, ignored)
       keys = reader%records
    end subroutine list_keys

@@ -39,7 +39,7 @@ module fw_result_rows
       !> Rows so far; how many are likely, which sets the size of the chunks.
       integer, private :: n_rows = 0, expected = 1
       !> What of the case tells the shapes of rows; see fw_point_quantities.
-      type(case_type), private :: case
+      class(case_type), allocatable, private :: case
       type(column_type), allocatable, private :: columns(:)
    contains
       procedure :: create
@@ -81,8 +81,9 @@ contains
    !> A case without its model: rows need the sizes only.
    subroutine take_sizes(case, sizes)
       type(case_type), intent(in) :: case
-      type(case_type), intent(out) :: sizes
+      class(case_type), allocatable, intent(out) :: sizes
 
+      allocate (sizes)
       ! Matrices of thousands of dofs must not be held a second time.
       sizes%harmonics = case%harmonics
       sizes%over = case%over
