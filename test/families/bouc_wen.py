@@ -1,9 +1,14 @@
 """Joints of Bouc and Wen, against their differential equation."""
+import ctypes
+import os
+import subprocess
+import tempfile
+from functools import cache
 from pathlib import Path
 
 import joints
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853
 
 TITLE = "Joints of Bouc and Wen"
 TEXT = """
@@ -22,7 +27,8 @@ amplitude).
 COUNT = 100
 SMALL = (0, 1, 3, 4)
 COLUMNS, ZERO = joints.COLUMNS, joints.ZERO
-ALSO = [Path(joints.__file__)]
+SOURCE = Path(__file__).with_suffix(".c")
+ALSO = [Path(joints.__file__), SOURCE]
 
 
 def draw_joint(random):
@@ -30,27 +36,38 @@ def draw_joint(random):
             "bouc_wen_beta": float(random.choice([0.5, random.uniform(0.5, 1.0)]))}
 
 
+class Chain(ctypes.Structure):
+    """struct chain of bouc_wen.c."""
+
+    _fields_ = [("n", ctypes.c_int), ("m", ctypes.c_int), ("omega", ctypes.c_double)] + [
+        (name, ctypes.c_void_p) for name in (
+            "inverse_mass", "damping", "stiffness", "constant", "cosine", "sine", "rows", "pull",
+            "limit", "exponent", "beta")]
+
+
+@cache
+def library():
+    """bouc_wen.c, compiled once in a process."""
+    target = Path(tempfile.mkdtemp()) / "bouc_wen.so"
+    subprocess.run([os.environ.get("CC", "cc"), "-O2", "-shared", "-fPIC", SOURCE, "-o", target,
+                    "-lm"], check=True)
+    made, real, array = ctypes.CDLL(str(target)), ctypes.c_double, ctypes.c_void_p
+    made.one_step.restype = made.turned.restype = real
+    made.one_step.argtypes = [real] * 4
+    made.turned.argtypes = [real, real, ctypes.c_int, array, real, array]
+    made.follow.argtypes = [array] * 6 + [real, real, array, ctypes.c_int, array, array]
+    return made
+
+
 def turned(joint, steps, z, kept=None):
     """z after a period of steps of y over the limit, by the classical method."""
-    n, beta = joint["bouc_wen_exponent"], joint["bouc_wen_beta"]
-
-    def rate(z, ds):
-        w = z if ds > 0.0 else -z
-        return 1.0 - abs(z)**n * (1.0 if w > 0.0 else 1.0 - 2.0 * beta)
-
-    for k, ds in enumerate(steps):
-        a = rate(z, ds)
-        b = rate(z + 0.5 * ds * a, ds)
-        c = rate(z + 0.5 * ds * b, ds)
-        z += ds * (a + 2.0 * b + 2.0 * c + rate(z + ds * c, ds)) / 6.0
-        if kept is not None:
-            kept[k] = z
-    return z
+    return library().turned(joint["bouc_wen_exponent"], joint["bouc_wen_beta"], len(steps),
+                            steps.ctypes.data, z, None if kept is None else kept.ctypes.data)
 
 
 def march(joint, y):
     """Force at the instants: z that repeats lies where a turn neither rises nor falls."""
-    steps = (np.diff(np.append(y, y[0])) / joint["limit"]).tolist()
+    steps = np.diff(np.append(y, y[0])) / joint["limit"]
     low, high = -1.0, 1.0
     gain = [turned(joint, steps, low) - low, turned(joint, steps, high) - high]
     side = 0
@@ -77,27 +94,18 @@ def integrate(case, u, base):
     if case["harmonics"] < 5 or int(1e6 * case["omega"]) % 3:
         return None
     all_joints, n = case["joints"], len(case["mass"])
-    inverse = np.linalg.inv(case["mass"])
     limit = np.array([j["limit"] for j in all_joints])
-    exponent = np.array([j["bouc_wen_exponent"] for j in all_joints])
-    beta = np.array([j["bouc_wen_beta"] for j in all_joints])
     rows = np.zeros((len(all_joints), n))
     for i, joint in enumerate(all_joints):
         rows[i, joint["dof"] - 1] = 1.0
         if joint["other"]:
             rows[i, joint["other"] - 1] = -1.0
-    pull = np.array([j["stiffness"] for j in all_joints]) / limit
-
-    def slope(t, x):
-        displacement, velocity, z = x[:n], x[n:2 * n], x[2 * n:]
-        load = case["static"] + case["cosine"] * np.cos(case["omega"] * t) \
-            + case["sine"] * np.sin(case["omega"] * t)
-        load = load - case["stiffness"] @ displacement - case["damping"] @ velocity \
-            - rows.T @ (limit * z)
-        ds = pull * (rows @ velocity)
-        shape = np.where(z * ds > 0.0, 1.0, 1.0 - 2.0 * beta)
-        return np.concatenate([velocity, inverse @ load, ds * (1.0 - np.abs(z)**exponent * shape)])
-
+    arrays = [np.ascontiguousarray(part, float) for part in (
+        np.linalg.inv(case["mass"]), case["damping"], case["stiffness"], case["static"],
+        case["cosine"], case["sine"], rows,
+        np.array([j["stiffness"] for j in all_joints]) / limit, limit,
+        [j["bouc_wen_exponent"] for j in all_joints], [j["bouc_wen_beta"] for j in all_joints])]
+    chain = Chain(n, len(all_joints), case["omega"], *(part.ctypes.data for part in arrays))
     steps = 256
     period = 2.0 * np.pi / case["omega"]
     _, slopes = joints.waves(case["harmonics"], np.zeros(1))
@@ -106,10 +114,15 @@ def integrate(case, u, base):
          for j in all_joints]
     start = np.concatenate([u.T @ first[:, 0], case["omega"] * u.T @ slopes[:, 0], z])
     times = period * (joints.PERIODS - 1 + np.arange(steps) / steps)
-    run = solve_ivp(slope, (0.0, times[-1]), start, method="DOP853", rtol=1e-9, atol=1e-11,
-                    t_eval=times)
+    tables = [np.ascontiguousarray(part, float) for part in (
+        DOP853.A, DOP853.B, DOP853.C, DOP853.E3, DOP853.E5)]
+    moved = np.empty((steps, n))
+    wrong = library().follow(ctypes.byref(chain), *(part.ctypes.data for part in tables), 1e-9,
+                             1e-11, start.ctypes.data, steps, times.ctypes.data,
+                             moved.ctypes.data)
+    assert not wrong, "the integration in time breaks off"
     rows_of, _ = joints.waves(case["harmonics"], 2.0 * np.pi * np.arange(steps) / steps)
-    return np.array([joints.projected(run.y[d], rows_of) for d in range(n)]).T
+    return np.array([joints.projected(moved[:, d], rows_of) for d in range(n)]).T
 
 
 def trial(seed, program, folder):

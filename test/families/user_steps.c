@@ -40,8 +40,9 @@ static double rate(const double *p, int forward, double z, double *slope)
 {
    const double size = fabs(z), w = forward ? z : -z;
    const double shape = w > 0.0 ? 1.0 : 1.0 - 2.0 * p[3];
-   *slope = size > 0.0 ? -shape * p[2] * pow(size, p[2] - 1.0) * copysign(1.0, z) : 0.0;
-   return 1.0 - shape * pow(size, p[2]);
+   const double power = pow(size, p[2] - 1.0);
+   *slope = -shape * p[2] * power * copysign(1.0, z);
+   return 1.0 - shape * power * size;
 }
 
 /* The classical method, four steps for each instant; slopes by z and by the step go along. */

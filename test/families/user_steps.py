@@ -34,7 +34,7 @@ COLUMNS = {"solved": "solved", "failed": "ended in words", "static": "with a sta
            "motion": "motion off"}
 ZERO = ("balance", "force", "work", "motion")
 SOURCE = Path(__file__).with_suffix(".c")
-ALSO = [Path(joints.__file__), Path(bouc_wen.__file__), SOURCE]
+ALSO = [Path(joints.__file__), Path(bouc_wen.__file__), bouc_wen.SOURCE, SOURCE]
 LAWS = ("slider", "bouc_wen", "maxwell", "both")
 INSTANTS, N_TIME, STEPS = joints.INSTANTS, 1024, 2048
 #: Of a run: differences of many steps take long, and a point that is not found by then is not.
@@ -105,7 +105,9 @@ class Joint:
         self.joint, self.y, self.z = joint, y, force / joint["limit"]
 
     def __call__(self, y):
-        self.z = bouc_wen.turned(self.joint, [(y - self.y) / self.joint["limit"]], self.z)
+        self.z = bouc_wen.library().one_step(
+            self.joint["bouc_wen_exponent"], self.joint["bouc_wen_beta"],
+            (y - self.y) / self.joint["limit"], self.z)
         self.y = y
         return self.joint["limit"] * self.z
 
