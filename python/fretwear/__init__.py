@@ -68,12 +68,14 @@ from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
 from .stress import Stress
 from .user_law import Law
+from .worst_pattern import WorstPattern, worst_pattern
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model", "NodalDiameter",
            "OutputError", "Point", "Polynomial", "Population", "Result", "RunInterrupted",
-           "RunStopped", "Sectors", "Spring", "Steps", "Stress", "__version__", "calibrate", "frf",
-           "mode", "optimise", "population", "resonance", "run", "wear"]
+           "RunStopped", "Sectors", "Spring", "Steps", "Stress", "WorstPattern", "__version__",
+           "calibrate", "frf", "mode", "optimise", "population", "resonance", "run", "wear",
+           "worst_pattern"]
 
 
 def __getattr__(name: str) -> object:

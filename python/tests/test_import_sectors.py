@@ -11,14 +11,12 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 from project import PROGRAM
+from sector_files import SMALL, command, write_sector
 
 from fretwear.cli import main
-from fretwear.disk import DiskParameters, FullDisk, build_full, reduce_disk
+from fretwear.disk import FullDisk, build_full, reduce_disk
 from fretwear.sector.assembly import Assembly
 
-#: Few elements; what is tested is the way of the matrices, not the disk.
-SMALL = DiskParameters(n_sectors=12, blade_angle=8.0, disk_rows=1, blade_rows=1, axial_layers=1,
-                       side_columns=1, radial_patches=1, axial_patches=1, n_modes=20)
 #: Frequencies of the same matrices in another order, of a condition of 1e7.
 SAME = 1e-7
 #: Modes of the same tied matrices by two solvers (measured 1.4e-12).
@@ -39,27 +37,9 @@ def full() -> FullDisk:
 
 @pytest.fixture(scope="module")
 def folder(full: FullDisk, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Matrices in Cartesian components, as of another program, with labels and node tables."""
     path = tmp_path_factory.mktemp("sector")
-    scipy.io.mmwrite(path / "mass.mtx", sp.coo_array(full.mass), symmetry="symmetric")
-    scipy.io.mmwrite(path / "stiffness.mtx", sp.coo_array(full.stiffness), symmetry="symmetric")
-    lines = [f"{i + 1} {dof // 3 + 1} {dof % 3 + 1}" for i, dof in enumerate(full.free)]
-    (path / "labels.txt").write_text("\n".join(["eq node component", *lines]))
-    nodes = Assembly(full.sector.mesh, full.parameters.material).nodes
-    n = full.n_interface
-    for side, rows in (("left", full.rows[:n]), ("right", full.rows[n:2 * n])):
-        found = np.unique(full.free[np.unique(rows.tocoo().col)] // 3)
-        # Another order on either side.
-        found = found[::-1] if side == "right" else found
-        table = [f"{k + 1}, {', '.join(f'{x:.12g}' for x in nodes[:, k])}" for k in found]
-        (path / f"{side}.csv").write_text("\n".join(["node, x, y, z", *table]))
+    write_sector(full, path)
     return path
-
-
-def command(folder: Path, *more: str) -> list[str]:
-    return ["import", str(folder / "mass.mtx"), str(folder / "stiffness.mtx"), "--labels",
-            str(folder / "labels.txt"), "--sectors", "12", "--left", str(folder / "left.csv"),
-            "--right", str(folder / "right.csv"), *more]
 
 
 def frequencies(folder: Path, file: Path) -> np.ndarray:

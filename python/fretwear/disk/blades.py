@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..blade_modes import held_modes, mode_rows
 from ..reduction import Reduction
 from ..sector.assembly import Assembly
 from .mesh import DISK
@@ -66,7 +67,7 @@ def find_blade(full: FullDisk, reduction: Reduction, n_modes: int) -> Blade:
     """Blade modes of a sector, and its matrices in the coordinates of a reduction; errors are those
     of `blade_modes`."""
     modes = blade_modes(full, n_modes)
-    rows = sp.csr_array((modes.stiffness[modes.inside].T @ modes.shapes / modes.squares).T)
+    rows = mode_rows(modes.stiffness, modes.inside, modes.squares, modes.shapes)
     return Blade(reduction.row(rows), np.sqrt(modes.squares), reduction.matrix(modes.stiffness),
                  reduction.matrix(modes.mass))
 
@@ -90,10 +91,5 @@ def blade_modes(full: FullDisk, n_modes: int) -> BladeModes:
     if not 0 < n_modes < len(inside):
         raise ParameterError(f"blade modes = {n_modes}: is not accepted; expected 1 to "
                              f"{len(inside) - 1}")
-    squares, shapes = sp.linalg.eigsh(stiffness[inside][:, inside], n_modes,
-                                      mass[inside][:, inside], sigma=0.0)
-    order = np.argsort(squares)
-    squares, shapes = squares[order], shapes[:, order]
-    # The sign of a mode is free: its largest entry is positive.
-    shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(n_modes)])
+    squares, shapes = held_modes(stiffness, mass, inside, n_modes)
     return BladeModes(inside, squares, shapes, stiffness, mass)

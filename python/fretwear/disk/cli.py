@@ -20,6 +20,7 @@ from .model import ReducedDisk, build_full, reduce_disk, reduced_system
 from .model_file import write_model
 from .parameters import DiskParameters, ParameterError
 from .recovery import recovery_mesh
+from .stress import find_stress
 
 __all__ = ["main"]
 
@@ -51,7 +52,8 @@ def _run(options: argparse.Namespace) -> int:
     model = reduce_disk(full, system)
     blade = find_blade(full, system.reduction, options.blade) if options.blade else None
     write_model(model, options.output, options.title,
-                recovery_mesh(full)[0] if options.mesh else None, blade)
+                recovery_mesh(full)[0] if options.mesh else None, blade,
+                find_stress(full, system.reduction) if options.stress else None)
     if not options.quiet:
         _summary(model, len(full.free), options.output, time.perf_counter() - started)
         if blade is not None:
@@ -82,6 +84,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--blade", type=int, default=0, metavar="MODES",
                         help="also store so many modes of the blade alone, and its matrices, by "
                              "which blades may differ (&mistuning)")
+    parser.add_argument("--stress", action="store_true",
+                        help="also store rows of the stress inside of the elements and at their "
+                             "vertices (&stress)")
     parser.add_argument("--title", help="title stored in the file")
     parser.add_argument("-q", "--quiet", action="store_true", help="no summary")
     parser.add_argument("--version", action="version", version=f"fretwear {__version__}")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..mesh import RecoveryMesh, mesh_datasets
 from ..model_file import strings, write_model_file
+from ..stress import Stress
 from .blades import Blade
 from .model import ReducedDisk
 from .parameters import DiskParameters
@@ -23,7 +24,8 @@ UNIT_SYSTEM = "mm-tonne-s-N"
 
 
 def write_model(model: ReducedDisk, path: str | Path, title: str | None = None,
-                mesh: RecoveryMesh | None = None, blade: Blade | None = None) -> None:
+                mesh: RecoveryMesh | None = None, blade: Blade | None = None,
+                stress: Stress | None = None) -> None:
     """Write a reduced sector as a model file.
 
     Parameters
@@ -38,12 +40,16 @@ def write_model(model: ReducedDisk, path: str | Path, title: str | None = None,
         Written as group /mesh. Without it `fretwear export` generates the mesh again.
     blade : Blade, optional
         Written as group /mistuning: what the blades may differ by.
+    stress : Stress, optional
+        Written as group /stress.
     """
     datasets = _datasets(model)
     if mesh is not None:
         datasets.update(mesh_datasets(mesh))
     if blade is not None:
         datasets.update(blade.datasets())
+    if stress is not None:
+        datasets.update(stress.datasets())
     p = model.parameters
     write_model_file(
         path, datasets, title=title or f"Shrouded disk, one of {p.n_sectors} sectors",

@@ -12,7 +12,18 @@ from .._progress import stages
 from ..errors import InputError, OutputError
 from ..factors import ENGINES, chosen_engine
 from .accuracy import Accuracy
-from .build import ROLES, FullModel, Source, drop, gather, model_datasets, read_rows, save
+from .blade import BladeNodes, read_blade
+from .build import (
+    ROLES,
+    FullModel,
+    Source,
+    drop,
+    gather,
+    model_datasets,
+    read_rows,
+    read_speeds,
+    save,
+)
 from .checks import check_model
 from .finding import Finding
 from .labels import Dofs, read_label_table
@@ -20,12 +31,15 @@ from .matrices import FORMATS, read_matrices
 from .matrix_file import MatrixFile
 from .meshes import ImportedMesh, read_mesh_file
 from .sectors import FRAMES, Interfaces, axis_of, in_sector_frames, read_interfaces
+from .stress import StressRows, read_stress_points, read_stress_table, stress_of_rows
 from .tables import Pairs, contact_rows, read_loads, read_pairs
 
-__all__ = ["FORMATS", "Accuracy", "Dofs", "Finding", "FullModel", "ImportedMesh", "Interfaces",
-           "MatrixFile", "Pairs", "Source", "add_arguments", "check_model", "contact_rows", "drop",
-           "gather", "main", "model_datasets", "read_interfaces", "read_label_table", "read_loads",
-           "read_matrices", "read_mesh_file", "read_pairs", "save"]
+__all__ = ["FORMATS", "Accuracy", "BladeNodes", "Dofs", "Finding", "FullModel", "ImportedMesh",
+           "Interfaces", "MatrixFile", "Pairs", "Source", "StressRows", "add_arguments",
+           "check_model", "contact_rows", "drop", "gather", "main", "model_datasets", "read_blade",
+           "read_interfaces", "read_label_table", "read_loads", "read_matrices", "read_mesh_file",
+           "read_pairs", "read_speeds", "read_stress_points", "read_stress_table", "save",
+           "stress_of_rows"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,6 +103,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--by-diameter", action="store_true",
                         help="reduce the sector on its own in every nodal diameter, without its "
                              "interfaces")
+    parser.add_argument("--blade", type=Path, metavar="TABLE",
+                        help="nodes of the blade above the disk (column node): its modes go into "
+                             "the file as rows, by which blades may differ (&mistuning)")
+    parser.add_argument("--blade-modes", type=int, metavar="N",
+                        help="how many modes of the blade (default: 5)")
+    parser.add_argument("--stress-rows", type=Source.of, metavar="FILE[#NAME]",
+                        help="six rows xx, yy, zz, xy, yz, zx of each point: its stress for each "
+                             "degree of freedom")
+    parser.add_argument("--stress-table", type=Path, metavar="TABLE",
+                        help="in place of it: point, dof and the six stresses of a unit of it")
+    parser.add_argument("--stress-points", type=Path, metavar="TABLE",
+                        help="places and strengths of these points: point, x, y, z, endurance, "
+                             "ultimate")
+    parser.add_argument("--at-speed", action="append", default=[], metavar="SPEED=FILE[#NAME]",
+                        help="stiffness at a rotation speed [rad/s], beside that at rest; one to "
+                             "three times")
     parser.add_argument("--title", default="", help="title of the model")
     parser.add_argument("--unit-system", default="", metavar="TEXT",
                         help="such as mm-tonne-s-N or m-kg-s-N; with one of these two, sizes are "
@@ -159,7 +189,10 @@ def _read(options: argparse.Namespace) -> FullModel:
     labels = None if options.labels is None else read_label_table(options.labels)
     model = gather(sources, options.files, format=options.format, mirror=options.mirror,
                    mass_factor=options.mass_factor, labels=labels)
+    model = replace(model, stress=_stress_of_rows(options, model),
+                    speeds=read_speeds(options.at_speed, options.format, model, options.mirror))
     model = drop(model, empty=options.drop_empty)
+    model = replace(model, stress=_stress(options, model))
     observe = {}
     for text in options.observe:
         name, equals, dof = text.rpartition("=")
@@ -174,12 +207,42 @@ def _read(options: argparse.Namespace) -> FullModel:
                                                                rows),
         loads={} if options.loads is None else read_loads(options.loads, model.dofs),
         mesh=None if options.mesh is None else read_mesh_file(options.mesh))
+    if options.blade_modes is not None and options.blade is None:
+        raise InputError("--blade-modes goes with --blade TABLE")
+    if options.blade is not None:
+        model = replace(model, blade=read_blade(options.blade, model.dofs,
+                                                 5 if options.blade_modes is None
+                                                 else options.blade_modes))
     return _sector(model, options)
+
+
+def _stress_of_rows(options: argparse.Namespace, model: FullModel) -> StressRows | None:
+    """Stress by rows, whose columns are those of the files."""
+    if options.stress_rows is None:
+        return None
+    return stress_of_rows(read_rows(options.stress_rows, options.format, "stress_rows"),
+                          model.dofs.n)
+
+
+def _stress(options: argparse.Namespace, model: FullModel) -> StressRows | None:
+    """Stress by rows or by a table, with places and strengths of the points."""
+    if options.stress_rows is not None and options.stress_table is not None:
+        raise InputError("--stress-rows and --stress-table: give one of both")
+    found = model.stress
+    if options.stress_table is not None:
+        found = read_stress_table(options.stress_table, model.dofs)
+    if options.stress_points is None:
+        return found
+    if found is None:
+        raise InputError("--stress-points goes with --stress-rows or --stress-table")
+    return read_stress_points(options.stress_points, found)
 
 
 def _sector(model: FullModel, options: argparse.Namespace) -> FullModel:
     """The model with the interfaces of a sector, where it is one."""
     given = [name for name in ("sectors", "left", "right") if getattr(options, name) is not None]
+    if model.blade is not None and len(given) < 3:
+        raise InputError("--blade needs --sectors, --left and --right: blades differ on a disk")
     if not given:
         if model.pairs is not None and model.pairs.sector_2 is not None:
             raise InputError(f"{options.pairs}: column sector_2 needs --sectors")

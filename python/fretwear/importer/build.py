@@ -18,6 +18,7 @@ from ..model_file import strings, write_model_file
 from ..reduction import Progress, Reduction, reduce
 from ..reduction_error import true_error
 from .accuracy import Accuracy, mode_options, range_datasets
+from .blade import BladeNodes, blade_datasets
 from .diameters import reduce_diameters
 from .finding import Finding
 from .labels import Dofs
@@ -26,10 +27,11 @@ from .matrix_file import HELD, MatrixFile, mirrored, one_triangle
 from .meshes import ImportedMesh
 from .recovery import recovery_mesh
 from .sectors import Interfaces
+from .stress import StressRows, stress_datasets
 from .tables import LOADS, Pairs, contact_rows
 
 __all__ = ["ROLES", "Accuracy", "FullModel", "Source", "drop", "gather", "model_datasets",
-           "read_rows", "save"]
+           "read_rows", "read_speeds", "save"]
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +44,8 @@ ROLES = {
                 "damping_matrix"),
     "stiffness_rotation": ("stiffness_rotation",),
 }
+#: Beside rest: as many as the library interpolates between.
+_MOST_SPEEDS = 3
 # fw_run works with full matrices.
 _LARGE = 3000
 
@@ -86,6 +90,12 @@ class FullModel:
         What the motion is shown on.
     in_cylinder : tuple of float or None
         Axis about which the components of the nodes of a sector are radial, tangential, axial.
+    blade : BladeNodes or None
+        The blade of a sector, by whose modes blades may differ.
+    stress : StressRows or None
+        Stress at points.
+    speeds : dict of float to (n, n) sparse array
+        Stiffness at rotation speeds [rad/s], beside that at rest.
     """
 
     matrices: dict[str, sp.csr_array]
@@ -99,6 +109,9 @@ class FullModel:
     interfaces: Interfaces | None = None
     mesh: ImportedMesh | None = None
     in_cylinder: tuple[float, float, float] | None = None
+    blade: BladeNodes | None = None
+    stress: StressRows | None = None
+    speeds: dict[float, sp.csr_array] = field(default_factory=dict)
 
 
 def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
@@ -154,9 +167,48 @@ def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
                                             for note in file.notes])
 
 
-def read_rows(source: Source, format: str | None = None) -> sp.csr_array:
-    """The matrix of relative displacements of a file."""
-    return _pick(read_matrices(source.path, format), source.name, "contact_rows")
+def read_rows(source: Source, format: str | None = None,
+              role: str = "contact_rows") -> sp.csr_array:
+    """The matrix of relative displacements of a file, or another whose rows are none of degrees of
+    freedom."""
+    return _pick(read_matrices(source.path, format), source.name, role)
+
+
+def read_speeds(texts: Sequence[str], format: str | None, model: FullModel,
+                mirror: bool = False) -> dict[float, sp.csr_array]:
+    """Stiffness at speeds from texts SPEED=FILE[#NAME], on the degrees of freedom of the model."""
+    found: dict[float, sp.csr_array] = {}
+    for text in texts:
+        number, equals, file = text.partition("=")
+        try:
+            speed = float(number)
+        except ValueError:
+            equals = ""
+        if not equals or not file:
+            raise InputError(f"--at-speed {text}: must be SPEED=FILE[#NAME], such as 500=k500.op4")
+        if not (np.isfinite(speed) and speed > 0.0):
+            raise InputError(f"--at-speed {text}: must be a speed above 0 in rad/s; at rest it is "
+                             "--stiffness")
+        if speed in found:
+            raise InputError(f"--at-speed {text}: this speed is there twice")
+        source = Source.of(file)
+        matrix_file = read_matrices(source.path, format)
+        matrix = _pick(matrix_file, source.name, "stiffness")
+        where = f"--at-speed {text}"
+        if matrix.shape != (model.dofs.n,) * 2:
+            raise InputError(f"{where}: the matrix is {matrix.shape[0]} x {matrix.shape[1]}; "
+                             f"expected {model.dofs.n} x {model.dofs.n}, as --stiffness")
+        if matrix_file.labels is not None and model.dofs.labels is not None:
+            place = {label: i for i, label in enumerate(matrix_file.labels)}
+            if set(place) != set(model.dofs.labels):
+                raise InputError(f"{where}: its degrees of freedom are not those of --stiffness")
+            order = np.array([place[label] for label in model.dofs.labels])
+            matrix = sp.csr_array(matrix[order][:, order])
+        found[speed] = mirrored(matrix) if mirror and one_triangle(matrix) else matrix
+    if len(found) > _MOST_SPEEDS:
+        raise InputError(f"--at-speed: {len(found)} speeds; expected at most {_MOST_SPEEDS} beside "
+                         "rest")
+    return found
 
 
 def _pick(file: MatrixFile, name: str | None, role: str) -> sp.csr_array:
@@ -222,6 +274,10 @@ def drop(model: FullModel, *, empty: bool) -> FullModel:
                          for role, matrix in model.matrices.items()},
         dofs=Dofs(len(kept), None if labels is None else [labels[k] for k in kept],
                   held=() if labels is None else [labels[k] for k in np.flatnonzero(held)]),
+        stress=None if model.stress is None else replace(
+            model.stress, rows=sp.csr_array(model.stress.rows[:, kept])),
+        speeds={speed: sp.csr_array(matrix[kept][:, kept])
+                for speed, matrix in model.speeds.items()},
         notes=[*model.notes, f"{int(held.sum())} held and {int((out & ~held).sum())} empty "
                f"degrees of freedom are left out; {len(kept)} remain"])
 
@@ -248,6 +304,11 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
     symmetric = {role: _symmetric(matrix) for role, matrix in model.matrices.items()}
     observed = _observed(model)
     cyclic = model.interfaces is not None
+    for name, given in (("--blade", model.blade), ("--stress-rows and --stress-table",
+                        model.stress), ("--at-speed", model.speeds)):
+        if by_diameter and given:
+            raise InputError(f"{name} does not go with --by-diameter: leave that out, so that one "
+                             "set of coordinates serves all nodal diameters")
     if by_diameter:
         return _by_diameter(model, symmetric, n_modes, factor)
     if cyclic and model.pairs is not None and model.pairs.rows is not None:
@@ -271,12 +332,38 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
         observed = reduction.row(observed)
     if model.mesh is not None:
         data |= mesh_datasets(recovery_mesh(model, reduction))
+    if model.blade is not None:
+        data |= blade_datasets(model, symmetric, reduction)
+    if model.stress is not None:
+        data |= stress_datasets(model.stress, reduction)
+    if model.speeds:
+        data |= _at_speeds(model, data, reduction)
     if model.pairs is not None:
         data.update(_pair_values(model.pairs))
     if model.observe:
         data["observe/name"] = strings(model.observe)
         data["observe/matrix"] = observed if n_modes is not None else observed.toarray()
     return data
+
+
+def _at_speeds(model: FullModel, data: dict[str, NDArray[Any]],
+               reduction: Reduction | None) -> dict[str, NDArray[Any]]:
+    """Stiffness at rest and at the speeds, by one basis; the centrifugal load goes with these."""
+    if "stiffness_rotation" in model.matrices:
+        raise InputError("--at-speed beside --stiffness-rotation: either says what grows with the "
+                         "speed; leave one out")
+    found: dict[str, NDArray[Any]] = {"speed/value": np.array([0.0, *sorted(model.speeds)])}
+    per_square = data.pop("load/static_rotation", None)
+    for number, speed in enumerate(found["speed/value"]):
+        if number == 0:
+            found["speed/0/stiffness"] = data["stiffness"]
+        else:
+            whole = _symmetric(model.speeds[float(speed)])
+            found[f"speed/{number}/stiffness"] = (whole.toarray() if reduction is None
+                                                  else reduction.matrix(whole))
+        if per_square is not None:
+            found[f"speed/{number}/static"] = speed**2 * per_square
+    return found
 
 
 def _symmetric(matrix: sp.csr_array) -> sp.csr_array:
@@ -391,6 +478,11 @@ def save(model: FullModel, path: str | Path, n_modes: int | Accuracy | None = No
     found = [Finding("note", str(path), f"{n} degrees of freedom, "
                      f"{0 if model.pairs is None else len(model.pairs)} pairs, loads "
                      + (", ".join(name for name in LOADS if name in model.loads) or "none"))]
+    if model.blade is not None:
+        found.append(Finding("note", str(path), "frequencies of the blade alone [Hz]: " + ", ".join(
+            f"{omega / (2.0 * np.pi):.6g}" for omega in data["mistuning/row_omega"])))
+    if model.stress is not None:
+        found.append(Finding("note", str(path), f"stress at {len(model.stress.points)} points"))
     if "reduction/error" in data:
         found.append(Finding("note", str(path), "estimated error of the stiffness of the joint up "
                              f"to {data['reduction/frequency'][0]:.6g} Hz: "

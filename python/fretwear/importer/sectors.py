@@ -126,6 +126,9 @@ def in_sector_frames(model: FullModel, interfaces: Interfaces) -> FullModel:
         model, matrices={role: sp.csr_array(q.T @ matrix @ q)
                          for role, matrix in model.matrices.items()},
         loads={name: q.T @ load for name, load in model.loads.items()},
+        speeds={speed: sp.csr_array(q.T @ matrix @ q) for speed, matrix in model.speeds.items()},
+        stress=None if model.stress is None else replace(
+            model.stress, rows=sp.csr_array(model.stress.rows @ q)),
         notes=[*model.notes, f"{len(interfaces.right_nodes)} nodes of the right interface are in "
                "the frame of the next sector"])
 

@@ -17,7 +17,7 @@ from skfem import Basis, ElementHex2, FacetBasis, MeshHex1
 
 from .parameters import Material, ParameterError
 
-__all__ = ["Assembly", "FacetMeans", "facet_means"]
+__all__ = ["Assembly", "FacetMeans", "facet_means", "lame"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,7 +68,7 @@ class Assembly:
 
     def stiffness(self, elements: Elements = slice(None)) -> sp.csr_array:
         """Linear elastic stiffness [N/mm], (3 n_nodes, 3 n_nodes), likewise."""
-        lame, shear = _lame(self.material)
+        first, shear = lame(self.material)
         gradients = self._grad[elements]
         n_cells, n_points, _, n_local = gradients.shape
         flat = gradients.reshape(n_cells, n_points, 3 * n_local)
@@ -79,7 +79,7 @@ class Assembly:
         cells = np.empty((n_cells, n_local, 3, n_local, 3))
         for i in range(3):
             for j in range(3):
-                cells[:, :, i, :, j] = lame * products[:, i, :, j] + shear * products[:, j, :, i]
+                cells[:, :, i, :, j] = first * products[:, i, :, j] + shear * products[:, j, :, i]
             cells[:, :, i, :, i] += trace
         return self._scatter(cells.reshape(n_cells, 3 * n_local, 3 * n_local), 3, elements)
 
@@ -95,12 +95,12 @@ class Assembly:
         -------
         (3 n_nodes, 3 n_nodes) matrix [N/mm], or N/mm per (rad/s)^2
         """
-        lame, shear = _lame(self.material)
+        first, shear = lame(self.material)
         local = displacement.reshape(-1, 3)[self.cell_nodes]
         gradient = np.einsum("eqia,eaj->eqij", self._grad, local, optimize=True)
         strain = 0.5 * (gradient + gradient.swapaxes(-1, -2))
         stress = 2.0 * shear * strain
-        stress += lame * np.einsum("eqii->eq", strain)[..., None, None] * np.eye(3)
+        stress += first * np.einsum("eqii->eq", strain)[..., None, None] * np.eye(3)
         pulled = np.matmul(stress * self.weight[:, :, None, None], self._grad)
         n_cells, n_points, _, n_local = self._grad.shape
         flat = self._grad.reshape(n_cells, 3 * n_points, n_local)
@@ -119,7 +119,7 @@ class Assembly:
         return sp.csr_array(0.5 * (matrix + matrix.T))
 
 
-def _lame(material: Material) -> tuple[float, float]:
+def lame(material: Material) -> tuple[float, float]:
     """Lame's constants [MPa]."""
     shear = material.young / (2.0 * (1.0 + material.poisson))
     return 2.0 * shear * material.poisson / (1.0 - 2.0 * material.poisson), shear

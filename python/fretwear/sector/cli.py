@@ -38,6 +38,7 @@ from .parameters import (
     patch_grid,
 )
 from .recovery import recovery_mesh
+from .stress import reduced_stress, stress_points
 
 __all__ = ["main"]
 
@@ -82,7 +83,11 @@ def _run(options: argparse.Namespace) -> int:
     system = reduced_system(full)
     reduced = reduce_model(full, system)
     mesh = recovery_mesh(full, system)[0] if options.mesh else None
-    write_model(reduced, options.output, options.title, mesh)
+    stress = None
+    if options.stress:
+        points = stress_points(full.sector.mesh, full.sector.body, parameters.material)
+        stress = reduced_stress(points, full.free, system.reduction, full.centrifugal)
+    write_model(reduced, options.output, options.title, mesh, stress)
     if options.picture:
         from .picture import draw_sector  # matplotlib only where a picture is wanted
 
@@ -116,6 +121,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mesh", action="store_true",
                         help="also store the mesh and the displacement of its vertices, for "
                              "fretwear export where the generator is not at hand")
+    parser.add_argument("--stress", action="store_true",
+                        help="also store rows of the stress inside of the elements and at their "
+                             "vertices (&stress)")
     parser.add_argument("--factor", choices=ENGINES, default="auto",
                         help="who factors the stiffness: the first of mumps, cholmod and superlu "
                              "that is installed, or one of them by name (default auto)")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..mesh import RecoveryMesh, mesh_datasets
 from ..model_file import strings, write_model_file
+from ..stress import Stress
 from .model import ReducedModel
 from .parameters import Discretisation, Geometry, Material, Retention, SectorParameters
 
@@ -26,7 +27,7 @@ UNIT_SYSTEM = "mm-tonne-s-N"
 
 
 def write_model(model: ReducedModel, path: str | Path, title: str | None = None,
-                mesh: RecoveryMesh | None = None) -> None:
+                mesh: RecoveryMesh | None = None, stress: Stress | None = None) -> None:
     """Write a reduced sector as a model file.
 
     Parameters
@@ -39,10 +40,14 @@ def write_model(model: ReducedModel, path: str | Path, title: str | None = None,
         Title attribute.
     mesh : RecoveryMesh, optional
         Written as group /mesh. Without it `fretwear export` generates the mesh again.
+    stress : Stress, optional
+        Written as group /stress.
     """
     datasets = _datasets(model)
     if mesh is not None:
         datasets.update(mesh_datasets(mesh))
+    if stress is not None:
+        datasets.update(stress.datasets())
     default = f"Bladed-disk sector with a dovetail root, {model.n_pairs} contact pairs"
     if model.parameters.retention.retention > 0.0:
         default += f", axial lock of {model.parameters.retention.retention:g} N/mm"
