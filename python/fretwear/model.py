@@ -175,9 +175,9 @@ Observation = Union[int, ArrayLike]
 class Model:
     """A linear structure with contact pairs and nonlinear springs.
 
-    ``M u'' + C u' + K u + B^T lambda = f_0 + f_c cos(omega t) + f_s sin(omega t)``. Units are
-    yours, as long as they fit each other. Arrays are kept without a copy where they are float64
-    and Fortran-ordered, and not written to; the properties give read-only views.
+    ``M u'' + C u' + K u + B^T lambda = f_0 + f_c cos(omega t) + f_s sin(omega t)``. Any
+    consistent units will do. Arrays are kept without a copy where they are float64 and
+    Fortran-ordered, and not written to; the properties give read-only views.
 
     Parameters
     ----------

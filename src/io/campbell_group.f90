@@ -33,7 +33,7 @@ contains
 
       call to%put('/campbell/speed', self%speed, 'rad/s', 'speed', 'rotation speed')
       call to%put('/campbell/nodal_diameter', self%nodal_diameter, '', 'diameter', &
-                  'nodal diameter, in the turning frame')
+                  'nodal diameter, in the rotating frame')
       call to%put('/campbell/open', self%open, 'rad/s', of_speeds, &
                   'natural frequencies without contact')
       call to%put('/campbell/closed', self%closed, 'rad/s', of_speeds, &
