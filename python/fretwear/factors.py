@@ -25,8 +25,8 @@ from threadpoolctl import threadpool_limits
 from ._mumps import mumps_instance, run_mumps
 from .errors import InputError
 
-__all__ = ["ENGINES", "Factor", "chosen_engine", "factor", "memory", "node_order",
-           "real_form"]
+__all__ = ["ENGINES", "Factor", "check_room", "chosen_engine", "factor", "memory",
+           "node_order", "real_form"]
 
 Floats = NDArray[Any]
 
@@ -52,6 +52,9 @@ _DISSECTED = 2000
 _STEPS = 3
 _FREE = ("motions remain that neither the contact nor the supports hold (rigid-body modes of the "
          "bonded structure); add supports or pairs")
+_NO_ROOM = ("the factors of {} degrees of freedom by {} do not fit into the memory that is left; "
+            "take another --factor (cholmod needs the least), or a coarser mesh away from the "
+            "contact")
 _NEGATIVE = "the stiffness is not positive semidefinite: {}; check signs and units, and leave " \
             "spin softening to stiffness_rotation"
 
@@ -104,7 +107,8 @@ def factor(matrix: sp.csc_matrix, engine: str = "auto") -> Factor:
     Raises
     ------
     InputError
-        The matrix has a negative pivot, or a motion that nothing holds; or the engine is not there.
+        The matrix has a negative pivot, or a motion that nothing holds; its factors do not fit into
+        the memory; or the engine is not there.
     """
     name = chosen_engine(engine)
     makers: dict[str, Callable[[Any], Factor]] = {
@@ -119,6 +123,8 @@ def factor(matrix: sp.csc_matrix, engine: str = "auto") -> Factor:
         if whole.shape[0] <= _EXPLAINED:
             _SuperLU(whole)   # names the degree of freedom
         raise InputError(str(refused)) from None
+    except MemoryError:
+        raise InputError(_NO_ROOM.format(whole.shape[0], name)) from None
 
 
 class _Refused(Exception):
@@ -196,6 +202,8 @@ class _Cholmod:
         matrix.sort_indices()
         try:
             self._factors = cholmod.cholesky(matrix, mode="supernodal", ordering_method="metis")
+        except (cholmod.CholmodOutOfMemoryError, cholmod.CholmodTooLargeError):
+            raise MemoryError from None
         except cholmod.CholmodNotPositiveDefiniteError:
             raise _Refused(_NEGATIVE.format("a pivot is negative") + f"; or {_FREE}") from None
         place = self._factors.P()
@@ -215,9 +223,11 @@ class _Mumps:
         self._instance, self._kept = mumps_instance(sp.tril(matrix))
         self._instance.cntl[1] = 0.0    # no pivoting: definite
         for job in (1, 2):
-            status = run_mumps(self._instance, job, _Refused)
+            status = run_mumps(self._instance, job, InputError)
             if status == "singular":
                 raise _Refused(_FREE)
+            if job == 1:
+                check_room(self._instance, f"{matrix.shape[0]} degrees of freedom need")
         negative = int(self._instance.infog[12])
         if negative:
             raise _Refused(_NEGATIVE.format(f"{negative} negative pivots") + f"; or {_FREE}")
@@ -226,7 +236,7 @@ class _Mumps:
     def solve(self, load: Floats) -> Floats:
         found = np.array(load, dtype=float, order="F")
         self._instance.set_dense_rhs(found)
-        run_mumps(self._instance, 3, _Refused)
+        run_mumps(self._instance, 3, InputError)
         return found
 
 
@@ -234,6 +244,8 @@ class _Pardiso:
     """Cholesky factors by Intel's PARDISO."""
 
     name = "pardiso"
+    # Its error for want of memory.
+    _NO_MEMORY = -2
 
     def __init__(self, matrix: sp.csc_matrix) -> None:
         from pypardiso import PyPardisoSolver
@@ -244,7 +256,9 @@ class _Pardiso:
         self._solver = PyPardisoSolver(mtype=2)
         try:
             self._solver.factorize(self._upper)
-        except PyPardisoError:
+        except PyPardisoError as error:
+            if error.value == self._NO_MEMORY:
+                raise MemoryError from None
             raise _Refused(_NEGATIVE.format("a pivot is negative") + f"; or {_FREE}") from None
         _check_held(self.solve, matrix.diagonal())
 
@@ -340,6 +354,15 @@ def node_order(matrix: sp.csc_matrix) -> NDArray[np.int64] | None:
     rank = np.empty(n_nodes, dtype=np.int64)
     rank[np.asarray(place)] = np.arange(n_nodes)
     return np.argsort(rank[node], kind="stable")
+
+
+def check_room(instance: Any, what: str) -> None:
+    """Refuse what MUMPS has found to be more than the memory, after its analysis."""
+    needed = 1e6 * float(instance.infog[17])
+    if needed > memory():
+        raise InputError(f"{what} {needed / 1e9:.1f} GB for their factors, and this machine has "
+                         f"{memory() / 1e9:.1f} GB; take --factor cholmod or superlu, patches of "
+                         "several nodes as pairs, or a coarser mesh away from the contact")
 
 
 def memory() -> float:

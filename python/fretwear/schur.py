@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ._mumps import mumps_instance, run_mumps
 from .errors import InputError
-from .factors import memory
+from .factors import check_room
 
 __all__ = ["STEP", "contact_compliances"]
 
@@ -66,11 +66,8 @@ def contact_compliances(stiffness: sp.csc_matrix, contact: sp.csr_array,
     for job in (1, 2):
         if run_mumps(instance, job, InputError) == "singular":
             raise InputError("the stiffness with its contact is singular")
-        if job == 1 and (needed := 1e6 * float(instance.infog[17])) > memory():
-            raise InputError(f"{n_contact} contact coordinates of {n} degrees of freedom need "
-                             f"{needed / 1e9:.1f} GB for their factors, and this machine has "
-                             f"{memory() / 1e9:.1f} GB; take --factor cholmod or superlu, patches "
-                             "of several nodes as pairs, or a coarser mesh away from the contact")
+        if job == 1:
+            check_room(instance, f"{n_contact} contact coordinates of {n} degrees of freedom need")
     del instance
     whole = np.tril(left) + np.tril(left, -1).T   # one triangle comes back
     return -whole.real, None if h == 0.0 else -whole.imag / h

@@ -5,7 +5,11 @@ SuperLU is always there, in all its ways; tests of another engine are skipped wh
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -131,6 +135,57 @@ def test_large_refusals_go_without_the_place(engine: str, monkeypatch: pytest.Mo
         matrix[0, 0] += change
         with pytest.raises(InputError, match=words):
             factor(sp.csc_matrix(matrix), engine)
+
+
+@pytest.mark.parametrize("engine", ALL)
+def test_contact_beyond_the_memory_is_refused_by_each(engine: str,
+                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the work; MUMPS knows the size of its factors beforehand too."""
+    k, m, rows = two_bodies()
+    with monkeypatch.context() as patch:
+        patch.setattr(reduction, "memory", lambda: 1e3)
+        with pytest.raises(InputError, match=r"3 contact coordinates of .* need .* GB, and this"):
+            reduce(m, k, rows, n_modes=N_MODES, factor=engine)
+    if engine != "mumps":
+        return
+    monkeypatch.setattr(factors, "memory", lambda: 1e3)
+    with pytest.raises(InputError, match=r"need .* GB for their factors, and this"):
+        reduce(m, k, rows, n_modes=N_MODES, factor=engine)
+    with pytest.raises(InputError, match=r"degrees of freedom need .* GB for their factors"):
+        factor(sp.csc_matrix(k + 3e3 * rows.T @ rows), engine)
+
+
+#: Room for the matrix and little more, in MB: its factors take two to three times as much.
+ROOM = 60
+OUT_OF_MEMORY = """
+import resource, sys
+from test_factors import brick
+from fretwear.errors import InputError
+from fretwear.factors import factor
+
+engine, room = sys.argv[1], int(sys.argv[2])
+few = brick(4)
+factor(few, engine).solve(few[:, [0]].toarray())   # loads what is loaded at the first use
+many = brick(20)
+size = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (size + room * 1000000,) * 2)
+try:
+    factor(many, engine)
+except InputError as error:
+    print("refused:", error)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="limits of memory by Linux")
+@pytest.mark.parametrize("engine", ALL)
+def test_factors_that_find_no_room_end_in_words(engine: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", OUT_OF_MEMORY, engine, str(ROOM)], capture_output=True, text=True,
+        check=False, env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+                                       "PYTHONPATH": os.pathsep.join(sys.path)})
+    assert done.returncode == 0, done.stderr
+    assert "refused:" in done.stdout
+    assert "do not fit into the memory" in done.stdout or "found no room" in done.stdout
 
 
 @pytest.mark.parametrize("engine", ALL)

@@ -92,22 +92,27 @@ contains
       real(wp), intent(inout) :: damping(:, :)
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: squares(:), moved(:, :), weighed(:, :), product(:, :)
+      real(wp), allocatable :: squares(:), moved(:, :), product(:, :)
       real(wp) :: least
-      integer :: j
+      integer :: n, i, j
 
       call find_lowest_modes(mass, stiffness, up_to, squares, moved, done, error)
       if (allocated(error) .or. .not. done) return
       if (size(squares) == 0) return
-      weighed = moved
       least = zero_square*up_to**2
       do j = 1, size(squares)
-         moved(:, j) = moved(:, j)/scale
-         weighed(:, j) = moved(:, j)*merge(sqrt(max(squares(j), 0.0_wp)), 0.0_wp, &
-                                           squares(j) > least)
+         moved(:, j) = moved(:, j)/scale*merge(sqrt(sqrt(max(squares(j), 0.0_wp))), 0.0_wp, &
+                                               squares(j) > least)
       end do
-      call multiply('N', weighed, 'T', moved, product)
-      damping = damping + ratio*(product + transpose(product))
+      n = size(moved, 1)
+      allocate (product(n, n))
+      call dsyrk('L', 'N', n, size(squares), 2.0_wp*ratio, moved, n, 0.0_wp, product, n)
+      do j = 1, n
+         damping(j:, j) = damping(j:, j) + product(j:, j)
+         do i = j + 1, n
+            damping(j, i) = damping(j, i) + product(i, j)
+         end do
+      end do
    end subroutine by_lowest_modes
 
    !> M Phi diag(omega) Phi^T M where M is far from singular: with M = L L^T the modes are

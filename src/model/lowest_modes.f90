@@ -50,7 +50,8 @@ contains
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
       type(space_type) :: space
-      real(wp), allocatable :: factor(:, :), block(:, :), small_matrix(:, :), values(:)
+      real(wp), allocatable :: factor(:, :), block(:, :), beyond(:, :), small_matrix(:, :)
+      real(wp), allocatable :: values(:)
       real(wp) :: shift
       integer :: n, most, before, k
       logical :: is_whole
@@ -64,15 +65,19 @@ contains
       allocate (space%v(n, most), space%mv(n, most), space%av(n, most))
       block = first_block(n)
       call solve(factor, block)
+      allocate (beyond(n, width))
+      call multiply('N', mass, block, beyond)
       is_whole = .false.
       do
          before = space%n
-         call add_block(mass, factor, block, space, done)
+         call add_block(mass, factor, block, beyond, space, done)
          if (.not. done) return
          is_whole = space%n == before
          if (.not. is_whole) then
             block = space%av(:, before + 1:space%n)
             call leave_out(space, block)
+            beyond = block
+            call multiply('N', mass, block, beyond)
          end if
          allocate (small_matrix(space%n, space%n))
          call multiply('T', space%mv(:, :space%n), space%av(:, :space%n), small_matrix)
@@ -81,7 +86,7 @@ contains
          end do
          call diagonalize(small_matrix, values, 'modal_damping', error)
          if (allocated(error)) return
-         if (are_found(mass, block, small_matrix, values, shift, highest**2, is_whole)) exit
+         if (are_found(block, beyond, small_matrix, values, shift, highest**2, is_whole)) exit
          deallocate (small_matrix)
          done = space%n + width <= most
          if (.not. done) return
@@ -150,39 +155,69 @@ contains
    end function first_block
 
    !> Vectors that are the block's own join the space; none where the space holds all.
-   subroutine add_block(mass, factor, block, space, done)
+   subroutine add_block(mass, factor, block, moved, space, done)
       !> (n, n)
       real(wp), contiguous, intent(in) :: mass(:, :), factor(:, :)
-      !> Vectors; what they have beyond the space on return (n, width).
-      real(wp), intent(inout) :: block(:, :)
+      !> What vectors have beyond the space, and M times it; of no use on return (n, width).
+      real(wp), contiguous, intent(inout) :: block(:, :), moved(:, :)
       !> Grows by the block.
       type(space_type), intent(inout) :: space
       !> False where a vector has a negative mass.
       logical, intent(out) :: done
-      real(wp) :: moved(size(block, 1), 1), whole, left
-      integer :: first, j, times
+      integer :: first, kept, times
 
       first = space%n
-      done = .true.
-      do j = 1, size(block, 2)
-         call multiply('N', mass, block(:, j:j), moved)
-         whole = dot_product(block(:, j), moved(:, 1))
-         do times = 1, 2
-            call leave_out(space, block(:, j:j))
-         end do
-         call multiply('N', mass, block(:, j:j), moved)
-         left = dot_product(block(:, j), moved(:, 1))
-         done = whole >= 0.0_wp .and. left >= -dependent*whole
+      kept = size(block, 2)
+      ! Twice: the second time takes away the round-off of the first. The matrix goes past all
+      ! vectors at once, as reading it is what takes the time.
+      do times = 1, 2
+         if (times == 2) then
+            call leave_out(space, block(:, :kept))
+            call multiply('N', mass, block(:, :kept), moved(:, :kept))
+         end if
+         call part_from_each_other(block, moved, kept, done)
          if (.not. done) return
-         if (left <= dependent*max(whole, tiny(whole))) cycle
-         space%n = space%n + 1
-         space%v(:, space%n) = block(:, j)/sqrt(left)
-         space%mv(:, space%n) = moved(:, 1)/sqrt(left)
       end do
-      if (space%n == first) return
+      space%n = first + kept
+      if (kept == 0) return
+      space%v(:, first + 1:space%n) = block(:, :kept)
+      space%mv(:, first + 1:space%n) = moved(:, :kept)
       space%av(:, first + 1:space%n) = space%mv(:, first + 1:space%n)
       call solve(factor, space%av(:, first + 1:space%n))
    end subroutine add_block
+
+   !> Vectors of a block orthonormal in M; those that depend on others go.
+   subroutine part_from_each_other(block, moved, kept, done)
+      !> Vectors, and M times them (n, width).
+      real(wp), intent(inout) :: block(:, :), moved(:, :)
+      !> How many of them, the first ones, are there.
+      integer, intent(inout) :: kept
+      !> False where a vector has a negative mass.
+      logical, intent(out) :: done
+      real(wp) :: whole, left, share
+      integer :: n_given, j, k, times
+
+      n_given = kept
+      kept = 0
+      done = .true.
+      do j = 1, n_given
+         whole = dot_product(block(:, j), moved(:, j))
+         do times = 1, 2
+            do k = 1, kept
+               share = dot_product(moved(:, k), block(:, j))
+               block(:, j) = block(:, j) - share*block(:, k)
+               moved(:, j) = moved(:, j) - share*moved(:, k)
+            end do
+         end do
+         left = dot_product(block(:, j), moved(:, j))
+         done = whole >= 0.0_wp .and. left >= -dependent*whole
+         if (.not. done) return
+         if (left <= dependent*max(whole, tiny(whole))) cycle
+         kept = kept + 1
+         block(:, kept) = block(:, j)/sqrt(left)
+         moved(:, kept) = moved(:, j)/sqrt(left)
+      end do
+   end subroutine part_from_each_other
 
    !> What a block has beyond the space.
    subroutine leave_out(space, block)
@@ -197,24 +232,22 @@ contains
    end subroutine leave_out
 
    !> Whether all modes up to the bound, and one above it, are in the space.
-   function are_found(mass, beyond, vectors, values, shift, square, is_whole) result(found)
-      !> (n, n)
-      real(wp), contiguous, intent(in) :: mass(:, :)
-      !> What the last block leaves (n, width), eigenvectors of the space and their values.
-      real(wp), intent(in) :: beyond(:, :), vectors(:, :), values(:)
+   function are_found(beyond, moved, vectors, values, shift, square, is_whole) result(found)
+      !> What the last block leaves, and M times it (n, width).
+      real(wp), contiguous, intent(in) :: beyond(:, :), moved(:, :)
+      !> Eigenvectors of the space and their values.
+      real(wp), intent(in) :: vectors(:, :), values(:)
       !> Of the factorization, and the highest that is wanted [(rad/s)**2].
       real(wp), intent(in) :: shift, square
       !> Whether the space holds everything.
       logical, intent(in) :: is_whole
       logical :: found
-      real(wp) :: moved(size(beyond, 1), size(beyond, 2)), gram(size(beyond, 2), size(beyond, 2))
-      real(wp) :: last(size(beyond, 2))
+      real(wp) :: gram(size(beyond, 2), size(beyond, 2)), last(size(beyond, 2))
       integer :: k, m
 
       found = is_whole
       if (found) return
       m = size(values)
-      call multiply('N', mass, beyond, moved)
       call multiply('T', beyond, moved, gram)
       ! Ascending values 1/(omega**2 + shift): the lowest modes are the last.
       do k = m, 1, -1
