@@ -34,6 +34,7 @@ module fw_features
       hysteretic = 'structural damping (loss_factor) or forces of the air', &
       stress = 'stress (group &stress, /stress of the model file)', &
       growing_stability = 'sweep%stability = .true. where gaps or normal loads grow', &
+      of_air = 'forces of the air', &
       of_campbell = "case%analysis = 'campbell'", &
       of_population = "case%analysis = 'population'"
 
@@ -137,6 +138,8 @@ contains
       case (hysteretic)
          asked = case%model%loss_factor > 0.0_wp .or. case%varied == loss_factor .or. &
                  allocated(case%model%cyclic%structural) .or. allocated(case%model%cyclic%air)
+      case (of_air)
+         asked = allocated(case%model%cyclic%air)
       case ('cyclic%mistuned = .true.')
          asked = case%model%cyclic%is_cyclic .and. case%model%cyclic%is_mistuned
       case default

@@ -7,7 +7,7 @@ module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_features, only: growing_stability, asks_for, feature_length, feature_text, hysteretic, &
-      matrices_alone, of_campbell, of_population, stress
+      matrices_alone, of_air, of_campbell, of_population, stress
    implicit none (type, external)
    private
 
@@ -182,9 +182,7 @@ module fw_rules
 
    !> Loads of supports are those of stiffness, damping and mass.
    type(rule_type), parameter :: of_base(*) = [ &
-      rule_type('group &base', hysteretic, 'use viscous damping, or give the load of the base'), &
-      rule_type('group &base', matrices_alone, 'give the load that the base makes'), &
-      rule_type('group &base', 'sweep%speed_order', 'give model%rotation_speed')]
+      rule_type('group &base', of_air, 'give the load that the base makes')]
 
    !> Groups of elements that are neither pairs nor springs.
    type(rule_type), parameter :: of_elements(*) = [ &

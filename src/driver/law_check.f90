@@ -12,6 +12,7 @@ module fw_law_check
    use fw_error, only: error_type, fatal_error, status_input
    use fw_guess, only: stuck_guess
    use fw_kinds, only: pi, wp
+   use fw_step_room, only: new_step_answer, new_step_room, step_answer, step_room
    use fw_text, only: to_text
    use fw_user_element, only: user_element
    use fw_user_path, only: step_slopes
@@ -214,8 +215,10 @@ contains
       real(wp) :: after(element%n_state + element%n_in), ends(2), state(element%n_state)
       real(wp), dimension(element%n_in, 2) :: u_ends, v_ends
       real(wp) :: none(element%n_state + 4*element%n_in, element%n_state + element%n_in)
+      type(step_answer) :: answer
       integer :: before, k
 
+      answer = new_step_answer(element%n_state, element%n_in)
       force = 0.0_wp
       state = element%start
       do k = 1, n_instants
@@ -223,7 +226,8 @@ contains
          ends = tau(k) - [2.0_wp*pi/n_instants, 0.0_wp]
          u_ends = u(:, [before, k])
          v_ends = v(:, [before, k])
-         call element%ask_step(omega, ends, u_ends, v_ends, .false., state, after, none, status)
+         call element%ask_step(omega, ends, u_ends, v_ends, .false., state, after, none, status, &
+                               answer)
          if (status /= 0) return
          state = after(:element%n_state)
          force(:, k) = after(element%n_state + 1:)
@@ -236,9 +240,9 @@ contains
       integer, intent(in) :: i
       type(trial_type), intent(in) :: trial
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable, dimension(:, :) :: apart, best, by, found, given, other, u, v
-      real(wp), allocatable :: after(:), scale(:), state(:)
-      real(wp) :: tau(2)
+      real(wp), allocatable, dimension(:, :) :: apart, best, by, found, given, other
+      real(wp), allocatable :: state(:)
+      type(step_room) :: room
       integer :: at(2), j, k, m, n, s, status
 
       associate (element => group%function(i))
@@ -246,23 +250,24 @@ contains
          m = element%n_in
          allocate (given(n + 4*m, n + m), source=0.0_wp)
          allocate (by, best, found, other, apart, source=given)
-         allocate (after(n + m), scale(n + 4*m), source=0.0_wp)
+         room = new_step_room(n, m)
          state = element%start
          do k = 1, n_instants
             j = merge(n_instants, k - 1, k == 1)
-            u = trial%u(:, [j, k])
-            v = trial%v(:, [j, k])
-            tau = trial%tau(k) - [2.0_wp*pi/n_instants, 0.0_wp]
-            call element%ask_step(trial%omega, tau, u, v, .true., state, after, given, status)
+            room%u = trial%u(:, [j, k])
+            room%v = trial%v(:, [j, k])
+            room%tau = trial%tau(k) - [2.0_wp*pi/n_instants, 0.0_wp]
+            call element%ask_step(trial%omega, room%tau, room%u, room%v, .true., state, &
+                                  room%after, given, status, room%answer)
             if (status /= 0) return
-            scale(:n) = max(maxval(abs(state)), maxval(abs(after(:n))))
-            scale(n + 1:) = [(maxval(abs(trial%u)), s=1, m), (maxval(abs(trial%v)), s=1, m), &
-                             (maxval(abs(trial%u)), s=1, m), (maxval(abs(trial%v)), s=1, m)]
-            where (.not. scale > 0.0_wp) scale = 1.0_wp
+            room%scale(:n) = max(maxval(abs(state)), maxval(abs(room%after(:n))))
+            room%scale(n + 1:) = [(maxval(abs(trial%u)), s=1, m), (maxval(abs(trial%v)), s=1, m), &
+                                  (maxval(abs(trial%u)), s=1, m), (maxval(abs(trial%v)), s=1, m)]
+            where (.not. room%scale > 0.0_wp) room%scale = 1.0_wp
             best = huge(1.0_wp)
             other = 0.0_wp
             do s = 1, size(steps)
-               call step_slopes(element, trial%omega, tau, u, v, state, steps(s), scale, by, status)
+               call step_slopes(element, trial%omega, state, steps(s), room, by, status)
                if (status /= 0) return
                where (abs(by - given) < abs(best))
                   best = by - given
@@ -274,9 +279,9 @@ contains
             ! In the size of what each input changes; where differences of two steps disagree there
             ! is a corner.
             do s = 1, n + m
-               best(:, s) = best(:, s)*scale
-               apart(:, s) = apart(:, s)*scale
-               by(:, s) = max(abs(given(:, s)), abs(found(:, s)))*scale
+               best(:, s) = best(:, s)*room%scale
+               apart(:, s) = apart(:, s)*room%scale
+               by(:, s) = max(abs(given(:, s)), abs(found(:, s)))*room%scale
                where (apart(:, s) > group%check_tolerance*maxval(by(:, s))) best(:, s) = 0.0_wp
                if (maxval(abs(best(:, s))) <= group%check_tolerance*maxval(by(:, s))) cycle
                at = maxloc(abs(best(:, s:s)))
@@ -290,7 +295,7 @@ contains
                                 "'difference' (check = .false. leaves this test out)", status_input)
                return
             end do
-            state = after(:n)
+            state = room%after(:n)
          end do
       end associate
    end subroutine check_step

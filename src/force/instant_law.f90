@@ -11,6 +11,7 @@ module fw_instant_law
    use fw_fourier, only: fourier_type
    use fw_kinds, only: pi, wp
    use fw_lapack, only: dgemm
+   use fw_step_room, only: step_room
    use fw_wave_sums, only: wave_sums, wave_table
    implicit none (type, external)
    private
@@ -31,8 +32,10 @@ module fw_instant_law
       !> Base functions at the instants, and their rates by tau (n_coefficients, n_time).
       real(wp), allocatable :: wave(:, :), rate(:, :)
       !> For the largest element: states (0 to n_time), slopes of steps, derivatives of states by
-      !> coefficients of the inputs, before and after a turn.
-      real(wp), allocatable :: state(:), slope(:), by_motion(:), carried(:)
+      !> coefficients of the inputs, before and after a turn and a step.
+      real(wp), allocatable :: state(:), slope(:), by_motion(:), carried(:), next(:)
+      !> For each element (n_elements).
+      type(step_room), allocatable :: step(:)
    end type path_room
 
    !> One element over the period: what it is asked, and what it answers. Inputs stand innermost.

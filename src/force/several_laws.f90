@@ -5,7 +5,7 @@
 !> Members that follow events keep doing so beside members that decide at instants.
 module fw_several_laws
    use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed
-   use fw_fourier, only: fourier_type
+   use fw_fourier, only: fourier_type, new_fourier
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
    use fw_worn_friction, only: worn_friction
@@ -49,9 +49,14 @@ module fw_several_laws
       procedure :: located
    end type several_laws
 
+   !> Instants that isolate events, at least.
+   integer, parameter :: fewest_for_events = 8
+
    !> A workspace for each member.
    type, extends(law_room) :: members_room
       type(force_workspace), allocatable :: work(:)
+      !> Instants of the members that follow events, where others need more: as many as if all did.
+      type(fourier_type), allocatable :: few
    end type members_room
 
 contains
@@ -209,16 +214,34 @@ contains
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(out) :: work
       type(members_room), allocatable :: room
-      integer :: m
+      integer :: m, n
 
       call work%reserve(self%n_elements, self%n_components, fourier)
       allocate (room)
       allocate (room%work(size(self%member)))
+      n = max(fewest_for_events, 2*(2*maxval(fourier%harmonic) + 1))
+      if (fourier%projects .and. fourier%n_time > n) then
+         allocate (room%few)
+         room%few = new_fourier(maxval(fourier%harmonic), n, .not. fourier%has_constant())
+      end if
       do m = 1, size(self%member)
-         call self%member(m)%law%reserve(fourier, room%work(m))
+         if (takes_few(self, m, room)) then
+            call self%member(m)%law%reserve(room%few, room%work(m))
+         else
+            call self%member(m)%law%reserve(fourier, room%work(m))
+         end if
       end do
       call move_alloc(room, work%room)
    end subroutine reserve
+
+   !> Whether a member has the few instants that isolate events.
+   pure logical function takes_few(self, member, room)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: member
+      type(members_room), intent(in) :: room
+
+      takes_few = self%member(member)%law%facts%follows_events .and. allocated(room%few)
+   end function takes_few
 
    !> Each member the forces of its pairs.
    subroutine evaluate(self, fourier, work)
@@ -263,7 +286,11 @@ contains
             associate (law => self%member(m)%law, own => room%work(m))
                if (law%prediction%takes_balance .neqv. takes_balance) cycle
                call take_inputs(self%member(m)%pair, work, own)
-               call law%evaluate(fourier, own)
+               if (takes_few(self, m, room)) then
+                  call law%evaluate(room%few, own)
+               else
+                  call law%evaluate(fourier, own)
+               end if
                call give_forces(self%member(m)%pair, own, work)
             end associate
          end do
@@ -316,9 +343,14 @@ contains
       select type (room => work%room)
       type is (members_room)
          do m = 1, size(self%member)
-            associate (own => room%work(m), at => self%member(m)%pair)
-               call self%member(m)%law%linearize(fourier, own)
-               if (own%waits) call self%member(m)%law%form_jacobian(fourier, own)
+            associate (law => self%member(m)%law, own => room%work(m), at => self%member(m)%pair)
+               if (takes_few(self, m, room)) then
+                  call law%linearize(room%few, own)
+                  if (own%waits) call law%form_jacobian(room%few, own)
+               else
+                  call law%linearize(fourier, own)
+                  if (own%waits) call law%form_jacobian(fourier, own)
+               end if
                work%linear_state(at) = own%linear_state
                work%linear_rests(at) = own%linear_rests
                do i = 1, size(at)
@@ -473,8 +505,13 @@ contains
       select type (room => work%room)
       type is (members_room)
          associate (m => self%of_member(element))
-            call self%member(m)%law%by_constant(self%place(element), name, fourier, room%work(m), &
-                                                force, is_known)
+            if (takes_few(self, m, room)) then
+               call self%member(m)%law%by_constant(self%place(element), name, room%few, &
+                                                   room%work(m), force, is_known)
+            else
+               call self%member(m)%law%by_constant(self%place(element), name, fourier, &
+                                                   room%work(m), force, is_known)
+            end if
          end associate
       end select
    end subroutine by_constant

@@ -11,6 +11,7 @@ module fw_user_element
    use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_procpointer, c_funptr, &
       c_int, c_loc, c_null_funptr, c_null_ptr, c_ptr, c_size_t
    use fw_kinds, only: wp
+   use fw_step_room, only: step_answer
    implicit none (type, external)
    private
 
@@ -217,7 +218,7 @@ contains
    end subroutine ask_object
 
    !> One step of an element with states.
-   subroutine ask_step(self, omega, tau, u, v, wants, state, after, slope, status)
+   subroutine ask_step(self, omega, tau, u, v, wants, state, after, slope, status, answer)
       class(user_element), intent(in), target :: self
       !> [rad/s]
       real(wp), intent(in) :: omega
@@ -231,47 +232,52 @@ contains
       real(wp), intent(inout), contiguous :: slope(:, :)
       !> 0, what the function returned, or `bad_number`.
       integer, intent(out) :: status
-      ! The function gets slopes of its forces by the state after the step, which it has at hand;
-      ! the march wants them by what the step began with, by the chain rule below.
-      real(wp), target :: new(self%n_state), force(self%n_in)
-      real(wp), target :: dstate(self%n_state + 4*self%n_in, self%n_state)
-      real(wp), target :: dforce(self%n_state + 2*self%n_in, self%n_in)
+      !> Of this element.
+      type(step_answer), intent(inout), target :: answer
       procedure(c_law_step), pointer :: function
       type(law_call) :: request
       type(user_call) :: fortran_request
-      integer :: m, n
+      integer :: i, j, m, n
 
       n = self%n_state
       m = self%n_in
-      new = state
-      force = 0.0_wp
-      if (wants) dstate = 0.0_wp
-      if (wants) dforce = 0.0_wp
+      answer%state = state
+      answer%force = 0.0_wp
+      if (wants) answer%by_before = 0.0_wp
+      if (wants) answer%by_after = 0.0_wp
       status = 0
       if (associated(self%object)) then
          call fill_call(self, omega, tau, u, v, wants, fortran_request)
-         call self%object%step(fortran_request, state, new, force, dstate, dforce, status)
+         call self%object%step(fortran_request, state, answer%state, answer%force, &
+                               answer%by_before, answer%by_after, status)
       else if (c_associated(self%function)) then
          call fill_request(self, omega, tau, u, v, wants, request)
          call c_f_procpointer(self%function, function)
          if (wants) then
-            status = int(function(self%user, request, c_loc(state), c_loc(new), c_loc(force), &
-                                  c_loc(dstate), c_loc(dforce)))
+            status = int(function(self%user, request, c_loc(state), c_loc(answer%state), &
+                                  c_loc(answer%force), c_loc(answer%by_before), &
+                                  c_loc(answer%by_after)))
          else
-            status = int(function(self%user, request, c_loc(state), c_loc(new), c_loc(force), &
-                                  c_null_ptr, c_null_ptr))
+            status = int(function(self%user, request, c_loc(state), c_loc(answer%state), &
+                                  c_loc(answer%force), c_null_ptr, c_null_ptr))
          end if
       end if
-      after(:n) = new
-      after(n + 1:) = force
+      after(:n) = answer%state
+      after(n + 1:) = answer%force
       if (status /= 0) return
       if (.not. all(ieee_is_finite(after))) status = bad_number
       if (.not. wants) return
-      ! d(force)/d(before) = d(force)/d(state after) d(state after)/d(before), and what the inputs
-      ! at the end give directly.
-      slope(:, :n) = dstate
-      slope(:, n + 1:) = matmul(dstate, dforce(:n, :))
-      slope(n + 2*m + 1:, n + 1:) = slope(n + 2*m + 1:, n + 1:) + dforce(n + 1:, :)
+      ! The function gives slopes of its forces by the state after the step, which it has at hand;
+      ! the march wants them by what the step began with. d(force)/d(before) = d(force)/d(state
+      ! after) d(state after)/d(before), and what the inputs at the end give directly.
+      slope(:, :n) = answer%by_before
+      slope(:, n + 1:) = 0.0_wp
+      do i = 1, m
+         do j = 1, n
+            slope(:, n + i) = slope(:, n + i) + answer%by_before(:, j)*answer%by_after(j, i)
+         end do
+      end do
+      slope(n + 2*m + 1:, n + 1:) = slope(n + 2*m + 1:, n + 1:) + answer%by_after(n + 1:, :)
       if (.not. all(ieee_is_finite(slope))) status = bad_number
    end subroutine ask_step
 

@@ -12,6 +12,7 @@ module fw_user_path
    use fw_fourier, only: fourier_type
    use fw_instant_law, only: element_motion, path_room
    use fw_kinds, only: pi, wp
+   use fw_step_room, only: new_step_room, step_room
    use fw_user_element, only: user_element
    implicit none (type, external)
    private
@@ -33,8 +34,8 @@ module fw_user_path
 
 contains
 
-   !> Room for the largest of the elements, and the base functions with their rates by tau: nothing
-   !> is allocated while elements are stepped.
+   !> Room for each element and for the largest of them, and the base functions with their rates by
+   !> tau: nothing is allocated while elements are stepped.
    type(path_room) function new_path(element, fourier) result(self)
       type(user_element), intent(in) :: element(:)
       type(fourier_type), intent(in) :: fourier
@@ -60,7 +61,12 @@ contains
       m = maxval(element%n_in)
       allocate (self%state(n*(fourier%n_time + 1)), self%slope(n_slope*(fourier%n_time + 1)), &
                 self%by_motion(n*m*fourier%n_coefficients), &
-                self%carried(n*m*fourier%n_coefficients), source=0.0_wp)
+                self%carried(n*m*fourier%n_coefficients), &
+                self%next(n*fourier%n_coefficients), source=0.0_wp)
+      allocate (self%step(size(element)))
+      do i = 1, size(element)
+         self%step(i) = new_step_room(element(i)%n_state, element(i)%n_in)
+      end do
    end function new_path
 
    !> Forces over the period that repeats.
@@ -70,7 +76,7 @@ contains
       type(path_room), intent(inout) :: path
 
       call settle(element, motion, path, element%n_state, element%n_in, .false., path%state, &
-                  path%slope, path%by_motion, path%carried)
+                  path%slope, path%by_motion, path%carried, path%next, path%step(motion%element))
    end subroutine follow_element
 
    !> The same, and the derivative of the forces by the coefficients of the inputs, transposed.
@@ -83,15 +89,16 @@ contains
 
       jacobian = 0.0_wp
       call settle(element, motion, path, element%n_state, element%n_in, .true., path%state, &
-                  path%slope, path%by_motion, path%carried)
+                  path%slope, path%by_motion, path%carried, path%next, path%step(motion%element))
       if (motion%status /= 0) return
-      call collect(element, fourier, motion, path, element%n_state, element%n_in, path%slope, &
-                   path%by_motion, path%carried, jacobian)
+      call collect(fourier, motion, path, element%n_state, element%n_in, path%slope, &
+                   path%by_motion, path%next, jacobian)
    end subroutine differentiate_element
 
    !> States of the turn that repeats; of it slopes and derivatives of the state before it, where
    !> these are wanted.
-   subroutine settle(element, motion, path, n, m, differentiates, state, slope, by_motion, carried)
+   subroutine settle(element, motion, path, n, m, differentiates, state, slope, by_motion, &
+                     carried, next, room)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
       type(path_room), intent(in) :: path
@@ -100,49 +107,66 @@ contains
       logical, intent(in) :: differentiates
       real(wp), intent(inout) :: state(n, 0:motion%n_time)
       real(wp), intent(inout) :: slope(n + 4*m, n + m, 0:motion%n_time)
-      real(wp), intent(inout), dimension(n, m*path%n_coefficients) :: by_motion, carried
-      real(wp) :: change(n), last, apart, inverse(n, n), sizes(4*m)
-      integer :: j, turn
+      real(wp), intent(inout), dimension(path%n_coefficients, n, m) :: by_motion, carried
+      real(wp), intent(inout) :: next(path%n_coefficients, n)
+      type(step_room), intent(inout) :: room
+      real(wp) :: last, apart
+      integer :: i, j, k, turn
       logical :: done, wants
 
       do j = 1, m
-         sizes([j, 2*m + j]) = maxval(abs(motion%u(j, :)))
-         sizes([m + j, 3*m + j]) = maxval(abs(motion%v(j, :)))
+         room%sizes([j, 2*m + j]) = maxval(abs(motion%u(j, :)))
+         room%sizes([m + j, 3*m + j]) = maxval(abs(motion%v(j, :)))
       end do
-      call strain(element, motion, n, m, differentiates, sizes, state(:, 0), slope(:, :, 0))
+      call strain(element, motion, n, m, differentiates, room, state(:, 0), slope(:, :, 0))
       if (motion%status /= 0) return
       if (differentiates) then
          by_motion = 0.0_wp
-         call carry(path, motion, n, m, 0, slope(:, :, 0), by_motion)
+         call carry(path, motion%omega, n, m, 0, slope(:, :, 0), by_motion, next)
       end if
       apart = huge(1.0_wp)
       do turn = 1, plain_turns + newton_steps
          wants = differentiates .or. turn > plain_turns
-         call march(element, motion, n, m, wants, sizes, state, slope)
+         call march(element, motion, n, m, wants, room, state, slope)
          if (motion%status /= 0) return
          ! A turn has repeated where all states have; where round-off of the function lets them fall
          ! no further, the last change counts, if it is small.
-         change = state(:, motion%n_time) - state(:, 0)
+         room%change = state(:, motion%n_time) - state(:, 0)
          last = apart
-         apart = share_of(change, state)
+         apart = share_of(room%change, state)
          done = apart <= repeated .or. (turn > plain_turns .and. apart <= nearly_repeated .and. &
                                         apart >= 0.5_wp*last)
          if (done .and. .not. differentiates) return
-         if (wants) call invert(n, m, motion%n_time, state, slope, inverse)
+         if (wants) call invert(n, m, motion%n_time, state, slope, room)
          if (differentiates) then
             carried = by_motion
-            call carry_all(path, motion, n, m, slope, carried)
+            do k = 1, motion%n_time
+               call carry(path, motion%omega, n, m, k, slope(:, :, k), carried, next)
+            end do
             if (done .or. turn > plain_turns) then
                ! Of the turn that repeats: dz_0 = dN/(1 - M).
-               by_motion = by_motion + matmul(inverse, carried - by_motion)
+               carried = carried - by_motion
+               do j = 1, m
+                  do i = 1, n
+                     do k = 1, n
+                        by_motion(:, k, j) = by_motion(:, k, j) + &
+                                             room%inverse(k, i)*carried(:, i, j)
+                     end do
+                  end do
+               end do
             else
                by_motion = carried
             end if
          end if
          if (done) return
          ! A plain turn goes on where the last one ended; Newton's method goes where it will repeat.
-         if (turn > plain_turns) change = matmul(inverse, change)
-         state(:, 0) = state(:, 0) + change
+         do i = 1, n
+            if (turn > plain_turns) then
+               state(:, 0) = state(:, 0) + room%inverse(:, i)*room%change(i)
+            else
+               state(i, 0) = state(i, 0) + room%change(i)
+            end if
+         end do
       end do
       motion%status = not_settled
       motion%instant = 1
@@ -160,84 +184,75 @@ contains
    end function share_of
 
    !> From the unstrained element to the motion where the first step begins.
-   subroutine strain(element, motion, n, m, wants, sizes, state, slope)
+   subroutine strain(element, motion, n, m, wants, room, state, slope)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
       integer, intent(in) :: n, m
       logical, intent(in) :: wants
-      !> Largest inputs over the period, as a step has them (u, v before, u, v after).
-      real(wp), intent(in) :: sizes(:)
+      type(step_room), intent(inout) :: room
       real(wp), intent(out) :: state(n)
       real(wp), intent(inout) :: slope(n + 4*m, n + m)
-      real(wp) :: u(m, 2), v(m, 2), tau(2), after(n + m)
       integer :: last
 
       last = motion%n_time
-      u(:, 1) = 0.0_wp
-      v(:, 1) = 0.0_wp
-      u(:, 2) = motion%u(:m, last)
-      v(:, 2) = motion%v(:m, last)
-      tau(2) = -2.0_wp*pi/last
-      tau(1) = 2.0_wp*tau(2)
-      call one_step(element, motion, last, n, m, tau, u, v, wants, sizes, element%start, after, &
-                    slope)
-      state = after(:n)
+      room%u(:, 1) = 0.0_wp
+      room%v(:, 1) = 0.0_wp
+      room%u(:, 2) = motion%u(:m, last)
+      room%v(:, 2) = motion%v(:m, last)
+      room%tau(2) = -2.0_wp*pi/last
+      room%tau(1) = 2.0_wp*room%tau(2)
+      call one_step(element, motion, last, n, m, wants, room, element%start, slope)
+      state = room%after(:n)
    end subroutine strain
 
    !> One turn.
-   subroutine march(element, motion, n, m, wants, sizes, state, slope)
+   subroutine march(element, motion, n, m, wants, room, state, slope)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
       integer, intent(in) :: n, m
       logical, intent(in) :: wants
-      !> As of `strain`.
-      real(wp), intent(in) :: sizes(:)
+      type(step_room), intent(inout) :: room
       real(wp), intent(inout) :: state(n, 0:motion%n_time)
       real(wp), intent(inout) :: slope(n + 4*m, n + m, 0:motion%n_time)
-      real(wp) :: u(m, 2), v(m, 2), tau(2), after(n + m)
       integer :: before, k
 
       motion%force = 0.0_wp
       do k = 1, motion%n_time
          before = merge(motion%n_time, k - 1, k == 1)
-         u(:, 1) = motion%u(:m, before)
-         u(:, 2) = motion%u(:m, k)
-         v(:, 1) = motion%v(:m, before)
-         v(:, 2) = motion%v(:m, k)
-         tau(2) = motion%tau(k)
-         tau(1) = tau(2) - 2.0_wp*pi/motion%n_time
-         call one_step(element, motion, k, n, m, tau, u, v, wants, sizes, state(:, k - 1), after, &
-                       slope(:, :, k))
+         room%u(:, 1) = motion%u(:m, before)
+         room%u(:, 2) = motion%u(:m, k)
+         room%v(:, 1) = motion%v(:m, before)
+         room%v(:, 2) = motion%v(:m, k)
+         room%tau(2) = motion%tau(k)
+         room%tau(1) = room%tau(2) - 2.0_wp*pi/motion%n_time
+         call one_step(element, motion, k, n, m, wants, room, state(:, k - 1), slope(:, :, k))
          if (motion%status /= 0) return
-         state(:, k) = after(:n)
-         motion%force(:m, k) = after(n + 1:)
+         state(:, k) = room%after(:n)
+         motion%force(:m, k) = room%after(n + 1:)
       end do
    end subroutine march
 
-   !> A step, with slopes that are given or by differences.
-   subroutine one_step(element, motion, k, n, m, tau, u, v, wants, sizes, state, after, slope)
+   !> A step from the inputs of the room to what is after it, with slopes that are given or by
+   !> differences.
+   subroutine one_step(element, motion, k, n, m, wants, room, state, slope)
       type(user_element), intent(in) :: element
       type(element_motion), intent(inout) :: motion
       integer, intent(in) :: k, n, m
-      real(wp), intent(in) :: tau(2)
-      real(wp), intent(inout) :: u(m, 2), v(m, 2)
       logical, intent(in) :: wants
-      !> As of `strain`.
-      real(wp), intent(in) :: sizes(:), state(n)
-      real(wp), intent(out) :: after(n + m)
+      type(step_room), intent(inout) :: room
+      real(wp), intent(in) :: state(n)
       real(wp), intent(inout) :: slope(n + 4*m, n + m)
-      real(wp) :: scale(n + 4*m)
 
       motion%instant = k
-      call element%ask_step(motion%omega, tau, u, v, wants .and. element%has_derivative, state, &
-                            after, slope, motion%status)
+      call element%ask_step(motion%omega, room%tau, room%u, room%v, &
+                            wants .and. element%has_derivative, state, room%after, slope, &
+                            motion%status, room%answer)
       if (motion%status /= 0 .or. .not. wants .or. element%has_derivative) return
-      scale(:n) = max(maxval(abs(state)), maxval(abs(after(:n))))
-      scale(n + 1:) = sizes
+      room%scale(:n) = max(maxval(abs(state)), maxval(abs(room%after(:n))))
+      room%scale(n + 1:) = room%sizes
       ! Where there is none, nothing tells a size.
-      where (.not. scale > 0.0_wp) scale = 1.0_wp
-      call step_slopes(element, motion%omega, tau, u, v, state, relative_step, scale, slope, &
-                       motion%status)
+      where (.not. room%scale > 0.0_wp) room%scale = 1.0_wp
+      call step_slopes(element, motion%omega, state, relative_step, room, slope, motion%status)
    end subroutine one_step
 
    !> Slopes by the displacements (force, displacement), where one step has brought the unstrained
@@ -246,55 +261,53 @@ contains
       type(user_element), intent(in) :: element
       real(wp), intent(in) :: y(:)
       real(wp), intent(out) :: slope(:, :)
-      real(wp) :: after(element%n_state + size(y)), tau(2)
-      real(wp), dimension(size(y), 2) :: u, v
-      real(wp) :: by(element%n_state + 4*size(y), element%n_state + size(y)), scale(size(by, 1))
+      type(step_room) :: room
+      real(wp) :: by(element%n_state + 4*size(y), element%n_state + size(y))
       integer :: m, n, status
 
       n = element%n_state
       m = size(y)
+      room = new_step_room(n, m)
       slope = 0.0_wp
-      tau = [0.0_wp, 2.0_wp*pi]
-      u(:, 1) = 0.0_wp
-      u(:, 2) = y
-      v = 0.0_wp
+      room%tau(2) = 2.0_wp*pi
+      room%u(:, 2) = y
       by = 0.0_wp
       if (element%has_derivative) then
-         call element%ask_step(1.0_wp, tau, u, v, .true., element%start, after, by, status)
+         call element%ask_step(1.0_wp, room%tau, room%u, room%v, .true., element%start, &
+                               room%after, by, status, room%answer)
       else
-         scale = maxval(abs(y))
-         if (.not. maxval(scale) > 0.0_wp) scale = 1.0_wp
-         call step_slopes(element, 1.0_wp, tau, u, v, element%start, relative_step, &
-                          scale, by, status)
+         room%scale = maxval(abs(y))
+         if (.not. maxval(room%scale) > 0.0_wp) room%scale = 1.0_wp
+         call step_slopes(element, 1.0_wp, element%start, relative_step, room, by, status)
       end if
       if (status == 0) slope = transpose(by(n + 2*m + 1:n + 3*m, n + 1:))
    end subroutine slopes_of_step
 
-   !> Central differences of a step.
-   subroutine step_slopes(element, omega, tau, u, v, state, relative, scale, slope, status)
+   !> Central differences of a step from the inputs of the room.
+   subroutine step_slopes(element, omega, state, relative, room, slope, status)
       type(user_element), intent(in) :: element
       real(wp), intent(in) :: omega
-      real(wp), intent(in) :: tau(:), u(:, :), v(:, :), state(:)
-      !> Of the steps, over the scales of (state, u, v before, u, v after).
-      real(wp), intent(in) :: relative, scale(:)
+      real(wp), intent(in), contiguous :: state(:)
+      !> Of the steps, over the scales of the room.
+      real(wp), intent(in) :: relative
+      type(step_room), intent(inout) :: room
       !> As of `ask_step`.
-      real(wp), intent(inout) :: slope(:, :)
+      real(wp), intent(inout), contiguous :: slope(:, :)
       integer, intent(out) :: status
-      real(wp), dimension(size(slope, 2)) :: ahead, behind
-      real(wp) :: none(size(slope, 1), size(slope, 2))
-      real(wp), dimension(size(u, 1), 2) :: u_at, v_at
-      real(wp) :: state_at(size(state)), shift
+      real(wp) :: shift
       integer :: j
 
-      do j = 1, size(scale)
-         shift = relative*scale(j)
+      do j = 1, size(room%scale)
+         shift = relative*room%scale(j)
          call at(shift)
-         call element%ask_step(omega, tau, u_at, v_at, .false., state_at, ahead, none, status)
+         call element%ask_step(omega, room%tau, room%u_at, room%v_at, .false., room%state_at, &
+                               room%ahead, room%none, status, room%answer)
          if (status /= 0) return
          call at(-shift)
-         call element%ask_step(omega, tau, u_at, v_at, .false., state_at, behind, none, status)
+         call element%ask_step(omega, room%tau, room%u_at, room%v_at, .false., room%state_at, &
+                               room%behind, room%none, status, room%answer)
          if (status /= 0) return
-         slope(j, :) = 0.5_wp*(ahead - behind)/shift
+         slope(j, :) = 0.5_wp*(room%ahead - room%behind)/shift
       end do
 
    contains
@@ -303,150 +316,152 @@ contains
          real(wp), intent(in) :: by
          integer :: i, m
 
-         m = size(u, 1)
-         state_at = state
-         u_at = u
-         v_at = v
+         m = size(room%u, 1)
+         room%state_at = state
+         room%u_at = room%u
+         room%v_at = room%v
          i = j - size(state)
          if (i <= 0) then
-            state_at(j) = state_at(j) + by
+            room%state_at(j) = room%state_at(j) + by
          else if (i <= m) then
-            u_at(i, 1) = u_at(i, 1) + by
+            room%u_at(i, 1) = room%u_at(i, 1) + by
          else if (i <= 2*m) then
-            v_at(i - m, 1) = v_at(i - m, 1) + by
+            room%v_at(i - m, 1) = room%v_at(i - m, 1) + by
          else if (i <= 3*m) then
-            u_at(i - 2*m, 2) = u_at(i - 2*m, 2) + by
+            room%u_at(i - 2*m, 2) = room%u_at(i - 2*m, 2) + by
          else
-            v_at(i - 3*m, 2) = v_at(i - 3*m, 2) + by
+            room%v_at(i - 3*m, 2) = room%v_at(i - 3*m, 2) + by
          end if
       end subroutine at
 
    end subroutine step_slopes
 
    !> Derivatives of the state by coefficients through step k (0: the strain).
-   subroutine carry(path, motion, n, m, k, slope, by_motion)
+   pure subroutine carry(path, omega, n, m, k, slope, by_motion, next)
       type(path_room), intent(in) :: path
-      type(element_motion), intent(in) :: motion
+      real(wp), intent(in) :: omega
       integer, intent(in) :: n, m, k
       real(wp), intent(in) :: slope(n + 4*m, n + m)
-      real(wp), intent(inout) :: by_motion(n, m, path%n_coefficients)
-      real(wp) :: column(n)
-      integer :: c, i, j
+      real(wp), intent(inout) :: by_motion(path%n_coefficients, n, m)
+      real(wp), intent(inout) :: next(path%n_coefficients, n)
+      integer :: i, j
 
-      do c = 1, path%n_coefficients
-         do j = 1, m
-            do i = 1, n
-               column(i) = dot_product(slope(:n, i), by_motion(:, j, c)) + &
-                           by_inputs(path, motion%omega, n, m, k, j, c, slope(:, i))
-            end do
-            by_motion(:, j, c) = column
+      do j = 1, m
+         do i = 1, n
+            call through(path, omega, n, m, k, j, slope(:, i), by_motion(:, :, j), next(:, i))
          end do
+         by_motion(:, :, j) = next
       end do
    end subroutine carry
 
-   !> What coefficient c of input j gives through the motion at both ends of step k.
-   pure real(wp) function by_inputs(path, omega, n, m, k, j, c, slope) result(value)
+   !> What follows from a step by the coefficients of input j: through the state before it, and
+   !> through the motion at both ends.
+   pure subroutine through(path, omega, n, m, k, j, slope, by_motion, value)
       type(path_room), intent(in) :: path
       real(wp), intent(in) :: omega
-      integer, intent(in) :: n, m, k, j, c
-      real(wp), intent(in) :: slope(:)
-      integer :: after, before
+      integer, intent(in) :: n, m, k, j
+      !> Of one number after the step.
+      real(wp), intent(in) :: slope(n + 4*m)
+      real(wp), intent(in) :: by_motion(path%n_coefficients, n)
+      real(wp), intent(out) :: value(path%n_coefficients)
+      integer :: after, before, i
 
       after = merge(path%n_time, k, k == 0)
-      value = slope(n + 2*m + j)*path%wave(c, after) + omega*slope(n + 3*m + j)*path%rate(c, after)
-      if (k == 0) return
-      before = merge(path%n_time, k - 1, k == 1)
-      value = value + slope(n + j)*path%wave(c, before) + &
-              omega*slope(n + m + j)*path%rate(c, before)
-   end function by_inputs
-
-   !> Through a whole turn.
-   subroutine carry_all(path, motion, n, m, slope, by_motion)
-      type(path_room), intent(in) :: path
-      type(element_motion), intent(in) :: motion
-      integer, intent(in) :: n, m
-      real(wp), intent(in) :: slope(n + 4*m, n + m, 0:motion%n_time)
-      real(wp), intent(inout) :: by_motion(n, m*path%n_coefficients)
-      integer :: k
-
-      do k = 1, motion%n_time
-         call carry(path, motion, n, m, k, slope(:, :, k), by_motion)
+      value = slope(n + 2*m + j)*path%wave(:, after) + &
+              omega*slope(n + 3*m + j)*path%rate(:, after)
+      if (k > 0) then
+         before = merge(path%n_time, k - 1, k == 1)
+         value = value + slope(n + j)*path%wave(:, before) + &
+                 omega*slope(n + m + j)*path%rate(:, before)
+      end if
+      do i = 1, n
+         value = value + slope(i)*by_motion(:, i)
       end do
-   end subroutine carry_all
+   end subroutine through
 
    !> Derivatives of the forces over the turn that repeats, and of their coefficients.
-   subroutine collect(element, fourier, motion, path, n, m, slope, by_motion, carried, jacobian)
-      type(user_element), intent(in) :: element
+   subroutine collect(fourier, motion, path, n, m, slope, by_motion, next, jacobian)
       type(fourier_type), intent(in) :: fourier
       type(element_motion), intent(in) :: motion
       type(path_room), intent(in) :: path
       integer, intent(in) :: n, m
       real(wp), intent(in) :: slope(n + 4*m, n + m, 0:motion%n_time)
-      real(wp), intent(in) :: by_motion(n, m, path%n_coefficients)
-      real(wp), intent(inout) :: carried(n, m, path%n_coefficients)
+      !> Before the first step; after the last one at the end.
+      real(wp), intent(inout) :: by_motion(path%n_coefficients, n, m)
+      real(wp), intent(inout) :: next(path%n_coefficients, n)
       real(wp), intent(inout), contiguous :: jacobian(:, :)
-      real(wp) :: value
       integer :: c, i, j, k, nc
 
       nc = path%n_coefficients
-      carried = by_motion
       do k = 1, motion%n_time
-         do i = 1, element%n_in
+         do i = 1, m
             do j = 1, m
+               call through(path, motion%omega, n, m, k, j, slope(:, n + i, k), &
+                            by_motion(:, :, j), next(:, 1))
                do c = 1, nc
-                  value = dot_product(slope(:n, n + i, k), carried(:, j, c)) + &
-                          by_inputs(path, motion%omega, n, m, k, j, c, slope(:, n + i, k))
-                  jacobian((j - 1)*nc + c, (i - 1)*nc + 1:i*nc) = &
-                     jacobian((j - 1)*nc + c, (i - 1)*nc + 1:i*nc) + value*fourier%analysis(:, k)
+                  jacobian((j - 1)*nc + 1:j*nc, (i - 1)*nc + c) = &
+                     jacobian((j - 1)*nc + 1:j*nc, (i - 1)*nc + c) + &
+                     fourier%analysis(c, k)*next(:, 1)
                end do
             end do
          end do
-         call carry(path, motion, n, m, k, slope(:, :, k), carried)
+         call carry(path, motion%omega, n, m, k, slope(:, :, k), by_motion, next)
       end do
    end subroutine collect
 
    !> Inverse of I - M, of a turn, on what does not stay as it is: by its singular values, which
    !> rotations of its columns give (Hestenes).
-   subroutine invert(n, m, n_time, state, slope, inverse)
+   subroutine invert(n, m, n_time, state, slope, room)
       integer, intent(in) :: n, m, n_time
       real(wp), intent(in) :: state(n, 0:n_time)
       real(wp), intent(in) :: slope(n + 4*m, n + m, 0:n_time)
-      real(wp), intent(out) :: inverse(n, n)
-      real(wp), dimension(n, n) :: turn, left, right
-      real(wp) :: length, scale(n)
-      integer :: i, k
+      type(step_room), intent(inout) :: room
+      real(wp) :: length
+      integer :: i, j, k
 
-      ! States may have different units.
-      scale = maxval(abs(state), dim=2)
-      where (.not. scale > 0.0_wp) scale = 1.0_wp
-      turn = 0.0_wp
-      do i = 1, n
-         turn(i, i) = 1.0_wp
-      end do
-      right = turn
-      do k = 1, n_time
-         turn = matmul(transpose(slope(:n, :n, k)), turn)
-      end do
-      do i = 1, n
-         left(:, i) = right(:, i) - turn(:, i)*scale(i)/scale
-      end do
-      call rotate(n, left, right)
-      inverse = 0.0_wp
-      do i = 1, n
-         length = norm2(left(:, i))
-         if (length <= singular) cycle
-         do k = 1, n
-            inverse(:, k) = inverse(:, k) + scale*right(:, i)*left(k, i)/(length**2*scale(k))
+      associate (turn => room%turn, left => room%left, right => room%right, scale => room%size)
+         ! States may have different units.
+         do i = 1, n
+            scale(i) = maxval(abs(state(i, :)))
+            if (.not. scale(i) > 0.0_wp) scale(i) = 1.0_wp
          end do
-      end do
+         turn = 0.0_wp
+         do i = 1, n
+            turn(i, i) = 1.0_wp
+         end do
+         right = turn
+         do k = 1, n_time
+            do j = 1, n
+               do i = 1, n
+                  left(i, j) = dot_product(slope(:n, i, k), turn(:, j))
+               end do
+            end do
+            turn = left
+         end do
+         do i = 1, n
+            left(:, i) = right(:, i) - turn(:, i)*scale(i)/scale
+         end do
+         call rotate(n, left, right, room%column)
+         room%inverse = 0.0_wp
+         do i = 1, n
+            length = norm2(left(:, i))
+            if (length <= singular) cycle
+            do k = 1, n
+               room%inverse(:, k) = room%inverse(:, k) + &
+                                    scale*right(:, i)*left(k, i)/(length**2*scale(k))
+            end do
+         end do
+      end associate
    end subroutine invert
 
    !> Columns at right angles to each other, by rotations that are gathered.
-   pure subroutine rotate(n, a, gathered)
+   pure subroutine rotate(n, a, gathered, column)
       integer, intent(in) :: n
       real(wp), intent(inout), dimension(n, n) :: a, gathered
+      !> Room.
+      real(wp), intent(inout) :: column(n)
       integer, parameter :: most_sweeps = 40
-      real(wp) :: along, c, s, t, x, column(n)
+      real(wp) :: along, c, s, t, x
       integer :: i, j, sweep
       logical :: turned
 

@@ -109,12 +109,13 @@ contains
       follows_speed = case%sweep%speed_order > 0.0_wp
    end function follows_speed
 
-   !> Hysteretic damping of one sector or of a structure that is none.
+   !> Hysteretic damping of one sector or of a structure that is none, and that moves by itself:
+   !> beside a base the motion that is solved for is not the one that strains it.
    pure logical function has_structural(case)
       type(case_type), intent(in) :: case
 
       associate (cyclic => case%model%cyclic)
-         has_structural = .not. cyclic%is_mistuned .and. &
+         has_structural = .not. (cyclic%is_mistuned .or. moves_base(case)) .and. &
                           (case%model%loss_factor > 0.0_wp .or. allocated(cyclic%structural) .or. &
                            cyclic%loss_factor > 0.0_wp .or. case%varied == loss_factor)
       end associate

@@ -217,15 +217,27 @@ contains
 
    end subroutine carry
 
-   !> What moves as the base says takes no load.
-   subroutine check_supports(reader, base, model)
+   !> What moves as the base says takes no load, and a constant motion no force without a place.
+   subroutine check_supports(reader, base, turns, model)
       type(reader_type), intent(inout) :: reader
       type(base_motion), intent(in) :: base
+      !> Whether there are Coriolis forces.
+      logical, intent(in) :: turns
       !> With its loads.
       type(model_type), intent(in) :: model
       real(wp), allocatable :: loads(:, :)
       integer :: i
 
+      if (base%has_constant()) then
+         if (base%moves_supports() .and. allocated(model%cyclic%speed)) then
+            call reader%refuse('base', 'harmonic', 'has a 0, whose force changes with a speed '// &
+                               'that follows the frequency: must be above 0')
+         else if (turns .and. base%motion == motion_acceleration) then
+            call reader%refuse('base', 'harmonic', 'has a 0, and coriolis makes a force of a '// &
+                               'constant acceleration that grows for ever: must be above 0')
+         end if
+         if (reader%failed()) return
+      end if
       if (.not. base%moves_supports()) return
       loads = model%load_columns()
       do i = 1, size(base%dof)

@@ -330,6 +330,14 @@ contains
       end if
    end subroutine check_order
 
+   !> Whether the load of the base is made of matrices that a parameter may change.
+   pure logical function pulls_by_matrices(raw)
+      type(raw_model), intent(in) :: raw
+
+      pulls_by_matrices = raw%base%moves_supports() .or. &
+                          (raw%base%n_terms > 0 .and. allocated(raw%coriolis))
+   end function pulls_by_matrices
+
    !> Matrices that change from point to point: what they are formed from is kept, and the values
    !> that they are to serve. Nothing is kept of others.
    subroutine vary_matrices(case, error)
@@ -346,10 +354,10 @@ contains
          span = [case%resonance%start, case%resonance%end]
          by_factor = case%resonance%as == resonance_as_factor
       else if (is_of_matrices(case%over%number) .and. allocated(case%origin%raw%stiffness)) then
-         if (case%origin%raw%base%moves_supports()) then
+         if (pulls_by_matrices(case%origin%raw)) then
             call fatal_error(error, '&sweep parameter changes the matrices, which does not go '// &
-                             'with &base dof: use direction, or sweep over the frequency', &
-                             status_input)
+                             'with &base dof, nor with direction beside coriolis: use '// &
+                             'direction without it, or sweep over the frequency', status_input)
             return
          end if
          case%varied = case%over%number
@@ -476,7 +484,7 @@ contains
       case%damps_modes_up_to = options%modal_damping_up_to
       call read_loads(reader, options, raw, terms)
       call case%stress%take(raw%stress, options%rotation_speed)
-      call read_motion(reader, case%model%cyclic%is_cyclic, raw, case%contact, case%springs, &
+      call read_motion(reader, case%model%cyclic%has_sectors(), raw, case%contact, case%springs, &
                        case%elements)
       if (raw%base%moves_supports() .and. .not. reader%failed()) then
          call case%stress%ride(raw%base%dof, raw%base%carried)
@@ -489,9 +497,10 @@ contains
          ! The matrices may be what the sweep goes over, which is read after them.
          allocate (case%origin)
       end if
-      if (raw%base%moves_supports() .and. any(is_of_matrices(wanted))) call reader%refuse( &
-         'base', 'dof', 'moves supports by the matrices of the case: parameters that change '// &
-         'these do not go with it; use direction, or load%harmonic_scale')
+      if (pulls_by_matrices(raw) .and. any(is_of_matrices(wanted))) call reader%refuse( &
+         'base', 'n_terms', '= '//to_text(raw%base%n_terms)//' makes loads of the matrices of '// &
+         'the case (dof, or direction beside coriolis): parameters that change these do not go '// &
+         'with it; use direction without coriolis, or load%harmonic_scale')
       call finish_model(reader, options, raw, terms, case%model, case%origin, error, wanted)
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)

@@ -337,9 +337,10 @@ contains
          origin%wanted = wanted
       end if
       call form_matrices(options, raw, static, model)
-      call check_supports(reader, raw%base, model)
+      call check_supports(reader, raw%base, allocated(raw%coriolis), model)
       if (reader%failed()) return
-      call raw%base%apply(options%harmonic_scale, options%static_scale, model)
+      call raw%base%apply(options%harmonic_scale, options%static_scale, options%rotation_speed, &
+                          raw%coriolis, model)
       call take_table(raw, model)
       ! Large ones make room for what is to come.
       if (size(wanted) == 0 .and. .not. allocated(origin)) then

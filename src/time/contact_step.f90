@@ -13,6 +13,7 @@
 !> projected Gauss-Seidel sweeps (Jean 1999).
 module fw_contact_step
    use fw_instant_law, only: element_motion, reserve_motion
+   use fw_element_forces, only: element_forces, note_refusal
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
    use fw_time_structure, only: element_rows, time_structure
@@ -56,6 +57,10 @@ module fw_contact_step
       real(wp), allocatable :: rate(:), mismatch(:), relative(:), slope(:, :, :)
       type(lu_type) :: lu
       type(element_slopes), allocatable :: elements(:)
+      !> Frequency of the load [rad/s] and omega t in the middle of the step, which functions of a
+      !> user are told; and what those said that had no force for a motion.
+      real(wp) :: omega = 0.0_wp, tau = 0.0_wp
+      type(element_forces), allocatable :: refusals
    contains
       procedure :: solve
    end type contact_problem
@@ -75,6 +80,7 @@ contains
       allocate (self%state(structure%n_pairs), source=state_stick)
       allocate (self%slope(3, 3, structure%n_pairs), source=0.0_wp)
       call self%lu%reserve(n)
+      allocate (self%refusals)
       allocate (self%elements(size(structure%kind)))
       do k = 1, size(self%elements)
          associate (own => self%elements(k), kind => structure%kind(k))
@@ -99,16 +105,21 @@ contains
 
       done = .true.
       if (structure%n_rows == 0) return
+      self%refusals%status = 0
       ! The guess is the force of the last step.
       call set_rates(self, structure, w)
       do iteration = 1, max_newton
          call evaluate(self, structure, w)
+         if (self%refusals%status /= 0) exit
          done = maxval(abs(self%mismatch)) <= tolerance*self%scale
          if (done) return
          call newton_step(self, structure, w, singular)
          if (singular) exit
       end do
-      call evaluate(self, structure, w)
+      ! A motion without a force is none to go on from.
+      if (self%refusals%status == 0) call evaluate(self, structure, w)
+      done = self%refusals%status == 0
+      if (.not. done) return
       ! Cycling at round-off is no reason for sweeps.
       done = maxval(abs(self%mismatch)) <= loose_tolerance*self%scale .and. .not. singular
       if (.not. done) call sweep(self, structure, w, done)
@@ -262,6 +273,8 @@ contains
 
       associate (motion => own%motion)
          motion%element = i
+         motion%omega = self%omega
+         motion%tau(1) = self%tau
          motion%u = 0.0_wp
          motion%v = 0.0_wp
          motion%by_u = 0.0_wp
@@ -274,6 +287,12 @@ contains
          end do
          call kind%law%act(motion)
          own%slope(:, :, i) = 0.0_wp
+         if (motion%status /= 0) then
+            ! What ends the run comes before what takes the step back.
+            if (self%refusals%status <= 0) call note_refusal(kind%law, motion, self%refusals)
+            motion%status = 0
+            motion%force = 0.0_wp
+         end if
          do c = 1, size(kind%row, 1)
             r = kind%row(c, i)
             if (r == 0) cycle
@@ -356,8 +375,9 @@ contains
       self%force = merge(self%force, 0.0_wp, abs(self%force) <= huge(1.0_wp))
       do k = 1, max_sweeps
          call evaluate(self, structure, w)
-         done = maxval(abs(self%mismatch)) <= tolerance*self%scale
-         if (done) return
+         done = maxval(abs(self%mismatch)) <= tolerance*self%scale .and. &
+                self%refusals%status == 0
+         if (done .or. self%refusals%status /= 0) return
          do i = 1, structure%n_pairs
             ! With the relative motion as the pairs before have left it.
             if (structure%at_once(i)) then

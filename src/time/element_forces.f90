@@ -8,7 +8,7 @@ module fw_element_forces
    implicit none (type, external)
    private
 
-   public :: element_forces, new_element_forces
+   public :: element_forces, new_element_forces, note_refusal
 
    !> The elements of one kind.
    type :: forces_of_kind
@@ -107,7 +107,7 @@ contains
                end do
                call kind%law%act(motion)
                if (motion%status /= 0) then
-                  call note(kind%law, motion, self)
+                  call note_refusal(kind%law, motion, self)
                   return
                end if
                do c = 1, kind%law%n_in
@@ -120,10 +120,10 @@ contains
    end subroutine add
 
    !> A motion that a law has no force for.
-   subroutine note(law, motion, self)
+   subroutine note_refusal(law, motion, self)
       class(instant_law), intent(in) :: law
       type(element_motion), intent(inout) :: motion
-      type(element_forces), intent(inout) :: self
+      class(element_forces), intent(inout) :: self
       type(force_workspace) :: work
       integer :: n
 
@@ -138,6 +138,6 @@ contains
       work%refusal%u(:n) = motion%u(:n, 1)
       work%refusal%v(:n) = motion%v(:n, 1)
       call law%complaint(work, self%complaint)
-   end subroutine note
+   end subroutine note_refusal
 
 end module fw_element_forces

@@ -9,7 +9,7 @@ module fw_time_structure
    use fw_kinds, only: wp
    use fw_contact_data, only: contact_type, spring_type
    use fw_element_forces, only: element_forces, new_element_forces
-   use fw_element_group, only: element_group
+   use fw_element_group, only: element_group, group_name_length
    use fw_elements, only: element_list
    use fw_error, only: error_type, fatal_error, status_failure, status_input
    use fw_force_law, only: force_law
@@ -32,6 +32,7 @@ module fw_time_structure
 
    !> Elements of one kind, whose forces follow from their rows and the rates of these.
    type :: element_rows
+      character(group_name_length) :: group = ''
       class(instant_law), allocatable :: law
       !> Row of each input, 0 where there is none (n_in, n_elements).
       integer, allocatable :: row(:, :)
@@ -70,9 +71,7 @@ module fw_time_structure
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
       !> Elements that are neither, for motions that are smooth; not allocated where there are none.
-      !> Whether there are functions of a user among them, which midpoint steps do not take.
       type(element_forces), allocatable :: elements
-      logical :: has_functions = .false.
       !> Projection on the directions with mass (n_dof, n_dof); not allocated where all have mass.
       real(wp), allocatable :: massive(:, :)
    contains
@@ -161,7 +160,7 @@ contains
       end do
    end subroutine take_pairs
 
-   !> Rows of elements behind those of the pairs: their inputs. Functions of a user are left out.
+   !> Rows of elements behind those of the pairs: their inputs.
    subroutine take_kinds(elements, self)
       type(element_list), intent(in) :: elements
       type(time_structure), intent(inout) :: self
@@ -171,13 +170,10 @@ contains
 
       do k = 1, size(elements%slot)
          if (elements%slot(k)%group%n_elements == 0) cycle
-         if (allocated(elements%slot(k)%group%function)) then
-            self%has_functions = .true.
-            cycle
-         end if
          call elements%slot(k)%group%make_law(1, law)
          call as_instant_law(law, kind%law)
          if (.not. allocated(kind%law)) cycle
+         kind%group = elements%slot(k)%group%name()
          call take_inputs(elements%slot(k)%group, self, kind%row)
          self%kind = [self%kind, kind]
       end do
@@ -223,9 +219,9 @@ contains
             do c = 1, size(self%kind(k)%row, 1)
                if (self%kind(k)%row(c, i) == 0) cycle
                if (.not. self%massless(self%kind(k)%row(c, i))) cycle
-               call fatal_error(error, "case%analysis = 'time': element "//to_text(i)//' of '// &
-                                '&damper acts on a dof without mass; give the dof a mass, or '// &
-                                "use 'frf' or 'point'", status_input)
+               call fatal_error(error, "case%analysis = 'time': element "//to_text(i)//' of &'// &
+                                trim(self%kind(k)%group)//' acts on a dof without mass; give '// &
+                                "the dof a mass, or use 'frf' or 'point'", status_input)
                return
             end do
          end do

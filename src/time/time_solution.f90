@@ -3,7 +3,7 @@
 module fw_time_solution
    use fw_interrupt, only: interrupt_type, stop_run
    use fw_kinds, only: wp
-   use fw_error, only: error_type, fatal_error, status_failure, status_input
+   use fw_error, only: error_type, fatal_error, status_failure
    use fw_period_record, only: averaged_coefficients, largest_sample, period_record, &
       sampled_coefficients
    use fw_periodic_state, only: find_periodic_state, periodic_report
@@ -53,12 +53,6 @@ contains
       logical :: smoothly
 
       smoothly = is_smooth(structure, omega)
-      if (structure%has_functions .and. .not. smoothly) then
-         call fatal_error(error, 'analysis = ''time'' with &user needs a structure without '// &
-                          'contact pairs, mass on every dof, and natural frequencies below '// &
-                          '200 times that of the load; use ''frf'' or ''point''', status_input)
-         return
-      end if
       if (smoothly) then
          call new_smooth_integration(structure, observe, omega, options%steps_per_period, smooth)
          if (present(interrupt)) smooth%interrupt => interrupt
@@ -80,6 +74,10 @@ contains
                                      row_memory(structure, state%corrected))
          call find_periodic_state(stepper, options%n_periods, tolerance, vector, report)
          call stop_run(stepper%interrupt, error)
+         if (.not. allocated(error) .and. stepper%complaint /= '') then
+            call fatal_error(error, 'integration in time: '//trim(stepper%complaint), &
+                             status_failure)
+         end if
          if (allocated(error)) return
          call fill_point(stepper%record, n_harmonics, point)
          ! A step whose contact problem was not solved does not obey the equations, even if the

@@ -15,6 +15,9 @@ contains
       logical, intent(out) :: accepted
       logical :: done
 
+      ! What has ended the run is not integrated any further.
+      accepted = .true.
+      if (self%complaint /= '') return
       associate (s => self%structure, step => self%step(level))
          ! The load of the whole step acts in its middle, where the contact problem is written.
          call mean_load(self, instant, step%duration, self%load)
@@ -23,6 +26,8 @@ contains
          call take_rows(s, self%velocity, self%row_velocity)
          call take_rows(s, self%increment, self%row_increment)
          call set_references(self, step%h)
+         self%contact%omega = self%omega
+         self%contact%tau = 2.0_wp*pi*instant + 0.5_wp*self%omega*step%duration
          ! As a guess, and so that a refused step leaves no trace.
          self%contact%force = self%last_force
          call self%contact%solve(s, step%delassus, done)
@@ -30,6 +35,12 @@ contains
          call take_rows(s, self%increment, self%row_increment)
       end associate
       accepted = .true.
+      ! A number above 0 ends the run; one below 0 does where steps can be no smaller.
+      if (self%contact%refusals%status /= 0) then
+         accepted = self%contact%refusals%status > 0 .or. level == self%n_levels
+         if (accepted) self%complaint = self%contact%refusals%complaint
+         return
+      end if
       ! The smallest step is taken as it is; what was not solved is counted.
       if (level < self%n_levels) accepted = done .and. .not. any_change(self)
       if (accepted .and. .not. done) self%record%n_failed = self%record%n_failed + 1

@@ -34,6 +34,8 @@ module fw_time_stepper
       type(time_structure) :: structure
       !> [rad/time] of the load.
       real(wp) :: omega = 0.0_wp
+      !> What a function of a user said that had no force where it had to have one; blank: none.
+      character(400) :: complaint = ''
       !> Steps of every size: full ones, halves, quarters, .. (0:n_levels).
       type(step_operator), allocatable :: step(:)
       !> Halvings of a step at most.

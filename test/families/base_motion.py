@@ -10,7 +10,9 @@ Structures of one to six dofs, full matrices, on one or two supports (dofs of th
 round) or on a ground that moves in a direction; one to three harmonics of the base, some with a
 constant part, given as displacement, velocity or acceleration; an elastic pair that slips and a
 cubic spring between the supports and the structure, or within it; loads of their own beside in a
-half; 3 to 15 harmonics, one frequency.
+half; 3 to 15 harmonics, one frequency. Every other structure has further matrices, each in a half:
+Coriolis and circulatory forces and a stiffness of a rotation speed, which is given or follows the
+frequency, stiffness and damping of any shape, hysteretic damping by a matrix and by a loss factor.
 
 The judge knows no relative motion. It takes the absolute displacements of the result (of a ground:
 what it adds itself) and writes the equation of motion of every free dof anew with the whole
@@ -24,6 +26,8 @@ COLUMNS = {"solved": "solved", "failed": "ended in words", "slips": "with slip",
            "balance": "balance off", "supports": "supports off", "pair": "force of the pair off"}
 ZERO = ("balance", "supports", "pair")
 INSTANTS = 8192
+MATRICES = ("stiffness_rotation", "coriolis", "circulatory", "stiffness_unsymmetric",
+            "damping_unsymmetric", "structural_damping")
 
 
 def drawn(seed):
@@ -47,7 +51,8 @@ def drawn(seed):
     to_support = not on_ground and random.random() < 0.6
     other = abs(dof[0]) if to_support else int(random.integers(2, n_free + 1)) if n_free > 1 else 0
     loaded = random.random() < 0.5
-    return {"mass": mass, "stiffness": stiffness, "n_free": n_free,
+    return {**further(seed, n, any(t[0] == 0 for t in terms)),
+            "mass": mass, "stiffness": stiffness, "n_free": n_free,
             "damping": random.uniform(0.01, 0.05) * mass + random.uniform(0.01, 0.05) * stiffness,
             "dof": dof, "direction": random.normal(size=n) if on_ground else None,
             "motion": motion, "terms": terms, "harmonics": h,
@@ -59,14 +64,45 @@ def drawn(seed):
             "omega": random.uniform(0.4, 2.0)}
 
 
+def further(seed, n, is_constant):
+    """Matrices of every other seed, and the speed that they are for; zeros of the rest."""
+    random = np.random.default_rng([seed, 7])
+    found = {name: np.zeros((n, n)) for name in MATRICES}
+    found.update(loss_factor=0.0, speed=0.0, order=0.0)
+    if seed % 2 == 0:
+        return found
+    for name in MATRICES:
+        if random.random() < 0.5:
+            continue
+        root = random.normal(size=(n, n))
+        found[name] = {"stiffness_rotation": 0.05 * (root @ root.T),
+                       "coriolis": 0.4 * (root - root.T), "circulatory": 0.05 * root,
+                       "stiffness_unsymmetric": 0.1 * root, "damping_unsymmetric": 0.02 * root,
+                       "structural_damping": 0.05 * (root @ root.T)}[name]
+    if random.random() < 0.5:
+        found["loss_factor"] = random.uniform(0.01, 0.2)
+    if any(np.any(found[name]) for name in ("coriolis", "circulatory", "stiffness_rotation")):
+        # A constant motion does not go with a speed that follows the frequency.
+        follows = random.random() < 0.5 and not is_constant
+        found["order" if follows else "speed"] = random.uniform(0.5, 3.0)
+    return found
+
+
+def write_model(case, path):
+    with h5py.File(path, "w") as file:
+        file.attrs["format"], file.attrs["format_version"] = "fretwear-model", 1
+        for name in ("mass", "damping", "stiffness", *MATRICES):
+            if name not in MATRICES or np.any(case[name]):
+                file[name] = case[name]
+
+
 def text(case):
     def row(values):
         return ", ".join(f"{float(v)!r}" for v in np.ravel(values))
 
-    n = len(case["mass"])
     words = ("displacement", "velocity", "acceleration")
-    lines = ["&case", "analysis = 'point'", "/", "&model", f"n_dof = {n}"]
-    lines += [f"{key} = {row(case[key])}" for key in ("mass", "damping", "stiffness")]
+    lines = ["&case", "analysis = 'point'", "/", "&model", "source = 'hdf5'", "file = 'm.h5'",
+             f"loss_factor = {case['loss_factor']!r}", f"rotation_speed = {case['speed']!r}"]
     lines += ["/", "&base", f"n_terms = {len(case['terms'])}",
               f"motion = '{words[case['motion']]}'",
               "harmonic = " + ", ".join(str(t[0]) for t in case["terms"]),
@@ -81,7 +117,8 @@ def text(case):
                   "side_1 = 1", f"side_2 = {case['other']}", f"coefficient = {case['cubic']!r}"]
     lines += ["/", "&load", f"cosine = {row(case['cosine'])}", f"static = {row(case['static'])}",
               "/", "&harmonics", f"n_harmonics = {case['harmonics']}", "parity = 'all'", "/",
-              "&sweep", f"start = {case['omega']!r}", "/", "&solver", "tolerance = 1e-10", "/"]
+              "&sweep", f"start = {case['omega']!r}", f"speed_order = {case['order']!r}", "/",
+              "&solver", "tolerance = 1e-10", "/"]
     return "\n".join(lines) + "\n"
 
 
@@ -113,10 +150,13 @@ def marched(y, limit):
 
 def trial(seed, program, folder):
     case = drawn(seed)
+    write_model(case, folder / "m.h5")
     (folder / "case.nml").write_text(text(case))
     done = subprocess.run([program, "-q", "case.nml"], cwd=folder, capture_output=True, text=True,
                           check=False)
     kind = ("ground" if case["direction"] is not None else "supports")
+    if seed % 2:
+        kind += ", further matrices"
     found = {**dict.fromkeys(COLUMNS, 0), "kind": kind}
     if done.returncode == 4:
         return {**found, "failed": 1}
@@ -147,17 +187,24 @@ def trial(seed, program, folder):
         elastic[:, 0] += pair + cubic
         if case["other"]:
             elastic[:, case["other"] - 1] -= pair + cubic
+    speed = omega / case["order"] if case["order"] else case["speed"]
+    gyroscopic = speed * case["coriolis"]
+    stiffness = case["stiffness"] + speed**2 * case["stiffness_rotation"]
+    loss = case["structural_damping"] + case["loss_factor"] * stiffness
+    stiffness = stiffness + case["stiffness_unsymmetric"] + speed * case["circulatory"]
+    damping = case["damping"] + case["damping_unsymmetric"] + gyroscopic
     free = np.arange(case["n_free"])
     worst = largest = 0.0
     for h in range(h_max + 1):
         s = h * omega
-        z = case["stiffness"] - s**2 * case["mass"] + 1j * s * case["damping"]
+        z = stiffness - s**2 * case["mass"] + 1j * s * damping + 1j * (h > 0) * loss
         v = amplitudes(u, h)
         parts = [z @ v, amplitudes(elastic, h)]
         if case["direction"] is not None:
             # Inertia of the ground; a constant acceleration is one too.
             carried = base_of(case, h)
-            parts.append(-s**2 * case["mass"] @ case["direction"] * carried)
+            inertia = -s**2 * case["mass"] + 1j * s * gyroscopic
+            parts.append(inertia @ case["direction"] * carried)
         else:
             told = np.sign(case["dof"]) * base_of(case, h)
             found["supports"] |= int(np.abs(v[case["n_free"]:] - told).max() > 1e-10)

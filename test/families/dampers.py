@@ -3,7 +3,7 @@ import subprocess
 
 import h5py
 import numpy as np
-from mixed_laws import INSTANTS, projected, series
+from histories import INSTANTS, projected, series
 from normal_laws import row
 from scipy.integrate import solve_ivp
 

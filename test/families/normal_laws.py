@@ -3,7 +3,7 @@ import subprocess
 
 import h5py
 import numpy as np
-from mixed_laws import INSTANTS, marched, projected, series
+from histories import INSTANTS, marched, projected, series
 from scipy.integrate import solve_ivp
 
 TITLE = "Normal laws"

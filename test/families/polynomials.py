@@ -3,7 +3,7 @@ import subprocess
 
 import h5py
 import numpy as np
-from mixed_laws import projected, series
+from histories import projected, series
 
 TITLE = "Polynomial forces"
 TEXT = """

@@ -4,7 +4,7 @@ import subprocess
 
 import h5py
 import numpy as np
-from mixed_laws import projected
+from histories import projected
 from normal_laws import pressure, row
 from scipy.integrate import solve_ivp
 

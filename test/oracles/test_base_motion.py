@@ -300,6 +300,142 @@ def test_a_given_amplitude_on_a_base(tmp_path):
         assert np.allclose(file["base/coefficients"][0], base, rtol=1e-12, atol=1e-14)
 
 
+def rotor(random, n):
+    """Matrices of every kind, none of them symmetric that need not be."""
+    def root():
+        return random.normal(size=(n, n))
+
+    skew, full, spread = root(), root(), root()
+    return {"coriolis": 0.3 * (skew - skew.T), "circulatory": 0.05 * root(),
+            "stiffness_rotation": 0.05 * spread @ spread.T,
+            "structural_damping": 0.05 * full @ full.T,
+            "stiffness_unsymmetric": 0.1 * root(), "damping_unsymmetric": 0.02 * root()}
+
+
+def write_matrices(path, matrices):
+    with h5py.File(path, "w") as file:
+        file.attrs.update(format="fretwear-model", format_version=1)
+        for name, matrix in matrices.items():
+            file[name] = matrix
+
+
+def dynamic_stiffness(m, speed, loss, s):
+    """Of all dofs at a frequency s of a harmonic, with the speed that goes with it."""
+    k = m["stiffness"] + speed**2 * m["stiffness_rotation"]
+    d = m["structural_damping"] + loss * k if s > 0.0 else 0.0 * k
+    c = m["damping"] + m["damping_unsymmetric"] + speed * m["coriolis"]
+    return k + m["stiffness_unsymmetric"] + speed * m["circulatory"] - s**2 * m["mass"] \
+        + 1j * s * c + 1j * d
+
+
+@pytest.mark.parametrize("order", [None, 1.5])
+@pytest.mark.parametrize("motion", ["displacement", "velocity", "acceleration"])
+def test_supports_of_a_rotor_move_as_its_equations_say(tmp_path, motion, order):
+    """Coriolis, circulatory, unsymmetric and hysteretic parts, at a speed or along an order."""
+    random = np.random.default_rng(11)
+    of_frame = frame()["model"]
+    m = {name: np.array(of_frame[name]) for name in ("mass", "damping", "stiffness")}
+    m.update(rotor(random, 4))
+    write_matrices(tmp_path / "m.h5", m)
+    loss, speed, omegas = 0.07, 0.6, [0.7, 1.3, 1.9]
+    constant = motion == "displacement" and order is None
+    terms = [(1, 0.5, 20.0), (2, 0.1, -50.0), *([(0, 0.3, 0.0)] if constant else [])]
+    found = run_case(tmp_path, {
+        "case": {"title": "a rotor on two supports", "analysis": "frf"},
+        "model": {"source": "hdf5", "file": "m.h5", "loss_factor": loss,
+                  **({} if order else {"rotation_speed": speed})},
+        "base": {"n_terms": len(terms), "dof": [3, -4], "harmonic": [t[0] for t in terms],
+                 "amplitude": [t[1] for t in terms], "phase": [t[2] for t in terms],
+                 "motion": motion, "frame": "absolute"},
+        "harmonics": {"n_harmonics": 2}, "output": {"observe": [f"u{k + 1}" for k in range(4)]},
+        "sweep": {"values": omegas, **({"speed_order": order} if order else {})},
+        "solver": {"tolerance": TOLERANCE}})
+    power = ("displacement", "velocity", "acceleration").index(motion)
+    for omega, coefficients in zip(omegas, found.coefficients, strict=True):
+        for n, amplitude, phase in terms:
+            base = amplitude * np.exp(1j * np.radians(phase))
+            base = base / (1j * n * omega)**power if n else base
+            z = dynamic_stiffness(m, omega / order if order else speed, loss, n * omega)
+            u = np.array([0.0, 0.0, 1.0, -1.0]) * base
+            u[:2] = -np.linalg.solve(z[:2, :2], z[:2, 2:] @ u[2:])
+            has = coefficients[2 * n - 1] - 1j * coefficients[2 * n] if n else coefficients[0]
+            assert np.abs(has - u).max() < ROUND_OFF * np.abs(u).max()
+
+
+def test_a_ground_that_moves_under_a_rotor_turns_with_it(tmp_path):
+    """-M R u_b'' - Omega G R u_b': forces of inertia are those of the whole motion."""
+    random = np.random.default_rng(12)
+    of_frame = frame()["model"]
+    m = {name: np.array(of_frame[name]) + 0.3 * np.eye(4)
+         for name in ("mass", "damping", "stiffness")}
+    m.update(rotor(random, 4))
+    write_matrices(tmp_path / "m.h5", m)
+    loss, direction = 0.07, np.array([1.0, 0.4, -0.2, 0.7])
+    for order, speed in ((None, 0.6), (1.5, None)):
+        omegas = [0.7, 1.3]
+        found = run_case(tmp_path, {
+            "case": {"title": "a rotor on a ground", "analysis": "frf"},
+            "model": {"source": "hdf5", "file": "m.h5", "loss_factor": loss,
+                      **({} if order else {"rotation_speed": speed})},
+            "base": {"n_terms": 2, "direction": direction, "harmonic": [1, 2],
+                     "amplitude": [0.5, 0.1], "phase": [20.0, -50.0]},
+            "harmonics": {"n_harmonics": 2}, "output": {"observe": [f"u{k + 1}" for k in range(4)]},
+            "sweep": {"values": omegas, **({"speed_order": order} if order else {})},
+            "solver": {"tolerance": TOLERANCE}})
+        for omega, coefficients in zip(omegas, found.coefficients, strict=True):
+            for n, amplitude, phase in ((1, 0.5, 20.0), (2, 0.1, -50.0)):
+                s, turns = n * omega, omega / order if order else speed
+                base = amplitude * np.exp(1j * np.radians(phase))
+                inertia = -s**2 * m["mass"] + 1j * s * turns * m["coriolis"]
+                y = -np.linalg.solve(dynamic_stiffness(m, turns, loss, s),
+                                     inertia @ direction * base)
+                has = coefficients[2 * n - 1] - 1j * coefficients[2 * n]
+                assert np.abs(has - y).max() < ROUND_OFF * np.abs(y).max()
+
+
+def test_a_speed_that_follows_is_that_speed_at_each_point(tmp_path):
+    """With friction; along a branch too, whose steps take dR/domega."""
+    of_frame = frame()
+    m = {name: np.array(of_frame["model"][name]) for name in ("mass", "damping", "stiffness")}
+    m.update(rotor(np.random.default_rng(13), 4))
+    write_matrices(tmp_path / "m.h5", m)
+    case = {key: keys for key, keys in of_frame.items() if key != "model"}
+    case = merged(case, {"case": {"analysis": "frf"}, "model": {
+        "source": "hdf5", "file": "m.h5", "loss_factor": 0.05}})
+    swept = run_case(tmp_path, merged(case, {"sweep": {
+        "start": 0.9, "end": 1.5, "n_points": 4, "speed_order": 2.0}}))
+    for omega, coefficients in zip(swept.omega, swept.coefficients, strict=True):
+        one = run_case(tmp_path, merged(case, {
+            "case": {"analysis": "point"}, "sweep": {"start": float(omega)},
+            "model": {"rotation_speed": float(omega) / 2.0}}))
+        assert difference(coefficients, one.coefficients[0]) < WITHIN
+    branch = run_case(tmp_path, merged(case, {"sweep": {
+        "start": 0.9, "end": 1.5, "n_points": 8, "speed_order": 2.0,
+        "continuation": "arclength"}}))
+    at = len(branch.omega) // 2
+    omega = float(branch.omega[at])
+    one = run_case(tmp_path, merged(case, {
+        "case": {"analysis": "point"}, "sweep": {"start": omega},
+        "model": {"rotation_speed": omega / 2.0}}))
+    assert difference(branch.coefficients[at], one.coefficients[0]) < WITHIN
+
+
+@pytest.mark.parametrize(("groups", "message"), [
+    ({"sweep": {"speed_order": 2.0}, "base": {"harmonic": [0, 1]}}, "has a 0, whose force changes"),
+    ({"base": {"dof": None, "direction": [1.0] * 4, "harmonic": [0, 1],
+               "motion": "acceleration"}, "model": {"rotation_speed": 1.0}}, "grows for ever"),
+    ({"base": {"dof": None, "direction": [1.0] * 4}, "model": {"rotation_speed": 1.0},
+      "sensitivity": {"parameters": "model%rotation_speed"}}, "change these")])
+def test_what_a_rotor_on_a_base_refuses(tmp_path, groups, message):
+    of_frame = frame()
+    m = {name: np.array(of_frame["model"][name]) for name in ("mass", "damping", "stiffness")}
+    write_matrices(tmp_path / "m.h5", m | rotor(np.random.default_rng(13), 4))
+    case = {key: keys for key, keys in of_frame.items() if key not in ("model", "contact")}
+    case = merged({**case, "model": {"source": "hdf5", "file": "m.h5"}}, groups)
+    done = run(tmp_path, case, status=(3,))
+    assert message in " ".join(done.stderr.split())
+
+
 REFUSED = [
     ({"polynomial": {"n_terms": 1, "factors": [1, 1, 1, 1, 0, 0, 0, 0], "coefficient": 0.1}},
      "sees the motion of &base dof itself"),

@@ -139,10 +139,44 @@ def test_a_law_that_has_no_force_is_named(tmp_path, number):
         tmp_path, own, status=1).stderr
 
 
+#: A pair at the second mass, which slips, and opens and closes nothing.
+PAIR = {"contact": {"n_pairs": 1, "law": "penalty", "side_1": [2, 0, 0], "mu": 0.3,
+                    "normal_load": 1.0, "tangential_stiffness": 1.0}}
+
+
+@pytest.mark.parametrize("derivative", ["given", "difference"])
+def test_a_law_of_a_user_beside_contact_is_the_built_in_one(tmp_path, derivative):
+    found = []
+    for own in (user(tmp_path, "drag", side_2=2, derivative=derivative),
+                {"damper": {"n_dampers": 1, "side_1": 1, "side_2": 2, "coefficient": 0.4,
+                            "power": 2.0}}):
+        in_time(tmp_path, {**own, **PAIR})
+        found.append(read(tmp_path / "case.h5"))
+    for name in ("coefficients", "contact/force"):
+        one, other = (result[name] for result in found)
+        assert np.abs(one - other).max() < WITHIN * np.abs(other).max()
+    assert 0.0 < found[0]["contact/fraction"][0, 0, 1] < 1.0
+
+
+def test_a_law_beside_contact_is_told_time_and_frequency(tmp_path):
+    """As a load: in the middle of a step, where a load is the mean of both ends."""
+    found = []
+    for own in (user(tmp_path, "pushing"), {"load": {"sine": [0.2 * OMEGA, 0.0]}}):
+        in_time(tmp_path, {**own, **PAIR})
+        found.append(read(tmp_path / "case.h5")["coefficients"])
+    assert np.abs(found[0] - found[1]).max() < 1e-3 * np.abs(found[1]).max()
+
+
+@pytest.mark.parametrize("number", [5, -5])
+def test_a_law_beside_contact_that_has_no_force_is_named(tmp_path, number):
+    own = user(tmp_path, "bound", n_parameters=1, parameters=[float(number)])
+    assert f"integration in time: user law bound (element 1) returned {number}" in in_time(
+        tmp_path, {**own, **PAIR}, status=1).stderr
+
+
 def test_what_is_not_integrated_is_said(tmp_path):
     assert "states of a law of a user does not go with" in in_time(
         tmp_path, user(tmp_path, "kept"), status=3).stderr
-    contact = {"contact": {"n_pairs": 1, "law": "penalty", "side_1": [2, 0, 0], "mu": 0.3,
-                           "normal_load": 1.0, "tangential_stiffness": 1.0}}
-    assert "needs a structure without contact pairs" in in_time(
-        tmp_path, {**user(tmp_path, "drag"), **contact}, status=3).stderr
+    massless = {"model": {"mass": [[1.0, 0.0], [0.0, 0.0]]}}
+    assert "element 1 of &user acts on a dof without mass" in in_time(
+        tmp_path, {**user(tmp_path, "drag", side_2=2), **massless}, status=3).stderr

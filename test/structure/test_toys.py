@@ -354,6 +354,36 @@ def test_law_runs(built, tmp_path):
     assert np.array_equal(*results)
 
 
+SEVERAL = """
+&case analysis = 'frf' /
+&model n_dof = 3, mass = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0,
+       stiffness = 2.0, -1.0, 0.0, -1.0, 2.0, -1.0, 0.0, -1.0, 2.0,
+       damping = 0.08, -0.04, 0.0, -0.04, 0.08, -0.04, 0.0, -0.04, 0.08 /
+&contact n_pairs = 3, law = {laws}, side_1 = 1, 0, 0, 2, 0, 0, 3, 0, 0, mu = 1.0,
+         normal_load = 0.5, slip_speed = 0.1, tangential_stiffness = 2.0 /
+&load cosine = 1.0, 0.5, 0.2 /
+&harmonics n_harmonics = 3, n_time = 256 /
+&sweep start = 0.6, end = 1.2, n_points = 5 /
+"""
+
+
+# Beside elastic and rigid pairs, in any order; with the law that it is a copy of, which then are
+# two members in place of one.
+@pytest.mark.parametrize(("laws", "exact"), [
+    ("'{}', 'penalty', 'dlft'", True), ("'penalty', 'dlft', '{}'", True),
+    ("'penalty', '{}', 'regularised'", False)])
+def test_law_runs_beside_others(built, tmp_path, laws, exact):
+    results = []
+    for law in ("toy", "regularised"):
+        done = run(built[0], tmp_path, law, SEVERAL.format(laws=laws.replace("{}", law)))
+        assert done.returncode == 0, done.stderr
+        with h5py.File(tmp_path / f"{law}.h5") as file:
+            results.append((file["coefficients"][:], file["contact/force"][:]))
+    for one, other in zip(*results, strict=True):
+        # Solved to 1e-8 or better, from the same guesses.
+        assert np.array_equal(one, other) if exact else np.allclose(one, other, rtol=0.0, atol=1e-7)
+
+
 def test_quantity_is_written(built, tmp_path):
     done = run(built[0], tmp_path, "quantity", RUBBING.format(law="regularised", more=""))
     assert done.returncode == 0, done.stderr
