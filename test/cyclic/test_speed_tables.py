@@ -208,7 +208,7 @@ def test_wrong_tables_are_refused_in_words(tmp_path, changes, groups, told):
 
 
 def test_a_resonance_stays_between_the_speeds(tmp_path):
-    """It may leave the sweep by half of it, and follows the highest point of sectors that differ."""
+    """It may leave the sweep by half of it; sectors that differ have one highest point."""
     groups, _ = disk(tmp_path, 2)
     with h5py.File(tmp_path / "model.h5") as file:
         low, high = ORDER * file["speed/value"][[0, -1]]
