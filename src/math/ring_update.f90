@@ -222,7 +222,7 @@ contains
    subroutine apply_transposed(self, rows)
       class(ring_update), intent(inout) :: self
       complex(wp), intent(inout) :: rows(self%n_rows, self%n_sectors)
-      integer :: j, n, p, r
+      integer :: a, j, n, p, r
 
       n = self%n_sectors
       p = self%n_shapes
@@ -236,7 +236,9 @@ contains
       end if
       do j = 1, n
          self%row = rows(:, j)
-         if (p > 0) self%row = self%row - matmul(conjg(self%v), self%shape((j - 1)*p + 1:j*p))
+         do a = 1, p
+            self%row = self%row - conjg(self%v(:, a))*self%shape((j - 1)*p + a)
+         end do
          call zgemv('N', r, r, one, self%own(1, 1, j), r, self%row, 1, zero, rows(1, j), 1)
       end do
    end subroutine apply_transposed
