@@ -37,6 +37,8 @@ COMMANDS = """## Measure
 | `make bench-limit` | limit, skips, laws |
 | `make bench-peers` | peers |
 | `python -m bench.speed.sectors` | sectors |
+| `python -m bench.speed.blades` | blades |
+| `python -m bench.speed.populations` | populations |
 | `python -m bench.speed.sector_modes` | modes |
 | `python -m bench.speed.imports` | imports |
 | `python -m bench.speed.patches` | patches |

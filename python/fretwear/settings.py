@@ -589,7 +589,8 @@ class Sweep(_Sweep, total=False):
     #: (default: .false.)
     stability: bool
     #: the rotation speed is the frequency over this: 1 for unbalance, an engine order of the loads;
-    #: 0: it does not follow; only: analysis = 'frf', 'point', 'population' (default: 0)
+    #: 0: it does not follow; only: analysis = 'frf', 'point', 'population', 'resonance' (default:
+    #: 0)
     speed_order: float
     #: points that are solved to find maxima become rows, in order; only: analysis = 'frf',
     #: continuation = 'natural' (default: .false.)

@@ -14,8 +14,8 @@
 !> with Gamma block circulant, of the order of the rows of all sectors.
 submodule(fw_balance_state) fw_balance_waves
    use fw_force_law, only: pair_mixed, pair_open
-   use fw_kinds, only: pi
-   use fw_lapack, only: zgetrf, zgetrs
+   use fw_kinds, only: pi, sp
+   use fw_lapack, only: zgemm, zgetrf, zgetrs
    use fw_size_options, only: sizes
    implicit none (type, external)
 
@@ -31,6 +31,16 @@ submodule(fw_balance_state) fw_balance_waves
    type :: law_means
       type(mean_type), allocatable :: element(:)
    end type law_means
+
+   ! Contact that differs from sector to sector (fw_balance_differing).
+   interface
+      !> Beside the factors of the waves of a harmonic, from the means of the laws.
+      module subroutine build_differing(self, h, mean)
+         class(balance_state), intent(inout) :: self
+         integer, intent(in) :: h
+         type(law_means), intent(in) :: mean(:)
+      end subroutine build_differing
+   end interface
 
 contains
 
@@ -83,7 +93,12 @@ contains
             call factors%factor()
          end associate
       end do
-      call build_own(self, h)
+      associate (differing => self%preconditioner%around%differing(h))
+         differing%is_there = .false.
+         self%preconditioner%around%own(h)%is_there = .false.
+         if (self%preconditioner%tells_sectors) call build_differing(self, h, mean)
+         if (.not. differing%is_there) call build_own(self, h)
+      end associate
    end subroutine build_harmonic
 
    !> I + Gamma D of a harmonic.
@@ -321,6 +336,8 @@ contains
          do j = 1, structure%n_alike
             call factors%wave(j, h)%solve(factors%waves(:, j, h))
          end do
+         if (factors%differing(h)%is_there) call factors%differing(h)%take_off( &
+            factors%waves(:, :, h))
          call structure%add_waves(factors%waves(:, :, h), factors%sectors(:, :, h))
          if (factors%own(h)%is_there) call correct_by_own(self, h)
          do j = 1, self%active%n_active

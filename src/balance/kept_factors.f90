@@ -17,6 +17,8 @@ module fw_kept_factors
       logical :: is_split = .false.
       !> Whether these are used although there are those of waves.
       logical :: is_whole = .false.
+      !> Whether those of waves are joined by what contact of each sector has of its own.
+      logical :: tells_sectors = .false.
       !> Of waves around equal sectors, in their place.
       type(wave_factors) :: around
       !> Coordinates for which they were built (first n entries).

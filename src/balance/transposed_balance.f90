@@ -292,6 +292,11 @@ contains
          do j = 1, s%n_coordinates
             around%sectors(s%slot(j), s%sector(j), h) = conjg(values(j))
          end do
+         if (around%differing(h)%is_there) then
+            call s%find_waves(around%sectors(:, :, h), around%waves(:, :, h))
+            call around%differing(h)%take_off_transposed(around%waves(:, :, h))
+            call s%add_waves(around%waves(:, :, h), around%sectors(:, :, h))
+         end if
          call solve_each_wave(state, h)
          if (own%is_there) then
             r = size(own%rows, 1)

@@ -14,7 +14,8 @@ module fw_features
    use fw_law_text, only: law_text, law_text_length
    use fw_laws, only: facts_of, is_viscous
    use fw_normal_law, only: curved_pairs
-   use fw_parameters, only: harmonic_scale, loss_factor, rotation_speed, static_scale
+   use fw_parameters, only: harmonic_scale, is_of_matrices, loss_factor, rotation_speed, &
+      static_scale
    use fw_resonance_options, only: condition_phase
    use fw_solver_options, only: continuation_arclength, scheme_bdf, scheme_implicit_euler, &
       scheme_runge_kutta, solver_newton, solver_pseudo_time
@@ -103,6 +104,8 @@ contains
          asked = a == analysis_time
       case ("resonance%parameter = 'model%rotation_speed'")
          asked = a == analysis_resonance .and. case%resonance%parameter == rotation_speed
+      case ('a resonance%parameter of the matrices')
+         asked = a == analysis_resonance .and. is_of_matrices(case%resonance%parameter)
       case ("case%analysis = 'wear'")
          asked = a == analysis_wear
       case ("case%analysis other than 'wear'")
@@ -113,8 +116,8 @@ contains
          asked = all(a /= [analysis_frf, analysis_point])
       case (of_population)
          asked = a == analysis_population
-      case ("case%analysis other than 'frf', 'point' or 'population'")
-         asked = all(a /= [analysis_frf, analysis_point, analysis_population])
+      case ("case%analysis other than 'frf', 'point', 'population' or 'resonance'")
+         asked = all(a /= [analysis_frf, analysis_point, analysis_population, analysis_resonance])
       case ("case%analysis other than 'frf', 'point', 'resonance' or 'mode'")
          asked = all(a /= [analysis_frf, analysis_point, analysis_resonance, analysis_mode])
       case (of_campbell)

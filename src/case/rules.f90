@@ -150,8 +150,11 @@ module fw_rules
       rule_type(matrices_alone, "case%analysis = 'time'", "use 'frf' or 'point'"), &
       rule_type(matrices_alone, "solver%kind = 'pseudo_time'", "use 'newton'"), &
       rule_type(matrices_alone, 'output%tail', 'take more n_harmonics'), &
-      rule_type('sweep%speed_order', "case%analysis other than 'frf', 'point' or 'population'", &
+      rule_type('sweep%speed_order', &
+                "case%analysis other than 'frf', 'point', 'population' or 'resonance'", &
                 'give model%rotation_speed'), &
+      rule_type('sweep%speed_order', 'a resonance%parameter of the matrices', &
+                'the speed follows the frequency, and the matrices with it: follow another one'), &
       rule_type('sweep%speed_order', growing_stability, &
                 'leave stability out, or give model%rotation_speed, speed by speed'), &
       rule_type('sweep%speed_order', 'sweep%parameter', &

@@ -19,6 +19,8 @@ module fw_blade_peaks
       integer :: n_sectors = 1
       !> A point costs so little that every interval between rows is looked into.
       logical :: is_cheap = .false.
+      !> The frequency that is asked for next is one that other disks are asked for too.
+      logical :: is_shared = .false.
    contains
       procedure(begin_pattern), deferred :: begin
       procedure(solve_at), deferred :: at
@@ -114,12 +116,14 @@ contains
       i = size(rows)
       if (response%is_cheap) i = 2**most_halvings*i
       call reserve(self, response, i + most_solved*response%n_observed)
+      response%is_shared = .true.
       do i = 1, size(rows)
          call sample(self, response, rows(i), k, error)
          if (allocated(error)) return
       end do
       if (looks_between .and. response%is_cheap) call look_into_all(self, response, error)
       if (allocated(error)) return
+      response%is_shared = .false.
       do i = 1, response%n_observed
          if (.not. looks_between) exit
          call climb(self, response, i, error)

@@ -6,8 +6,10 @@
 !>   x = W u,   (I + Gamma A) x = W Z^-1 F,   Gamma = W Z^-1 W^T,   observed = O Z^-1 (F - W^T A x).
 !>
 !> Gamma and O Z^-1 W^T are block circulant and of no pattern. A pattern costs a system of the order
-!> of the rows of all sectors.
+!> of the rows of all sectors. Where nothing but K, M and C acts, W is a part of what is observed of
+!> the modes of the nodal diameters; else its rows are coordinates.
 module fw_linear_blades
+   use fw_all_sectors, only: all_sectors
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_blade_patterns, only: blade_patterns
@@ -15,7 +17,7 @@ module fw_linear_blades
    use fw_deviation, only: damping_part, deviation_type, mass_part, stiffness_part
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_lapack, only: zgemm, zgetrf, zgetrs
+   use fw_lapack, only: zgetrf, zgetrs
    implicit none (type, external)
    private
 
@@ -34,7 +36,9 @@ module fw_linear_blades
    end type tuned_type
 
    type, extends(blade_response) :: linear_response
-      !> The tuned disk, its rows among its coordinates.
+      !> The tuned disk by its modes, the rows the last of what is observed of it.
+      type(all_sectors), allocatable :: modal
+      !> In place of it the tuned disk, its rows among its coordinates.
       type(balance_problem) :: problem
       type(balance_state) :: system
       !> What sectors have beside each other without a pattern, and the patterns.
@@ -43,7 +47,7 @@ module fw_linear_blades
       !> With the pattern.
       type(deviation_type), private :: deviation
       logical, private :: is_tuned = .true.
-      !> Frequencies of the rows of the sweep are kept; the last place is for others.
+      !> Frequencies that disks share are kept; the last place is for others.
       type(tuned_type), allocatable, private :: known(:)
       integer, private :: n_known = 0
       !> Scratch: I + Gamma A, and its solution.
@@ -60,15 +64,14 @@ module fw_linear_blades
 contains
 
    !> Room for so many frequencies that are asked for again and again.
-   subroutine reserve(self, n_rows)
+   subroutine reserve(self, n_shared)
       class(linear_response), intent(inout) :: self
-      !> Of the sweep.
-      integer, intent(in) :: n_rows
+      integer, intent(in) :: n_shared
       integer :: n, r
 
-      r = self%problem%structure%n_own()
+      r = size(self%base%rows, 1)
       n = self%n_sectors
-      allocate (self%known(n_rows + 1))
+      allocate (self%known(n_shared + 1))
       allocate (self%matrix(n*r, n*r), self%block(r, r, n), self%x(n*r), self%pivot(n*r))
    end subroutine reserve
 
@@ -91,7 +94,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       complex(wp) :: force(size(self%block, 1), self%n_sectors)
       complex(wp) :: observed(self%n_observed, self%n_sectors)
-      integer :: i, j, place
+      integer :: a, b, i, j, place
 
       amplitude = 0.0_wp
       converged = .false.
@@ -109,8 +112,13 @@ contains
             end do
             do i = 1, n
                do j = 1, n
-                  observed(:, i) = observed(:, i) - &
-                     matmul(tuned%shown(:, :, modulo(i - j, n) + 1), force(:, j))
+                  associate (shown => tuned%shown(:, :, modulo(i - j, n) + 1))
+                     do a = 1, size(shown, 2)
+                        do b = 1, size(shown, 1)
+                           observed(b, i) = observed(b, i) - shown(b, a)*force(a, j)
+                        end do
+                     end do
+                  end associate
                end do
             end do
          end if
@@ -125,8 +133,7 @@ contains
       !> At the frequency.
       type(tuned_type), intent(in) :: tuned
       logical, intent(out) :: solved
-      complex(wp), allocatable :: column(:, :)
-      integer :: i, info, j, m, n, r
+      integer :: a, b, c, i, info, j, m, n, r
 
       n = self%n_sectors
       r = size(self%block, 1)
@@ -134,14 +141,21 @@ contains
       self%block = self%deviation%part(:, :, :, stiffness_part) - &
                    tuned%omega**2*self%deviation%part(:, :, :, mass_part) + &
                    cmplx(0.0_wp, tuned%omega, wp)*self%deviation%part(:, :, :, damping_part)
-      ! Rows of all sectors by a force on those of one.
-      allocate (column(m, r))
+      ! Rows of all sectors by a force on those of one, a few at a time: too small for BLAS.
+      self%matrix = zero
       do j = 0, n - 1
-         do i = 0, n - 1
-            column(i*r + 1:(i + 1)*r, :) = tuned%gamma(:, :, modulo(i - j, n) + 1)
+         do b = 1, r
+            do i = 0, n - 1
+               associate (gamma => tuned%gamma(:, :, modulo(i - j, n) + 1))
+                  do c = 1, r
+                     do a = 1, r
+                        self%matrix(i*r + a, j*r + b) = self%matrix(i*r + a, j*r + b) + &
+                                                        gamma(a, c)*self%block(c, b, j + 1)
+                     end do
+                  end do
+               end associate
+            end do
          end do
-         call zgemm('N', 'N', m, r, r, one, column, m, self%block(1, 1, j + 1), r, zero, &
-                    self%matrix(1, j*r + 1), m)
       end do
       do i = 1, m
          self%matrix(i, i) = self%matrix(i, i) + one
@@ -164,13 +178,42 @@ contains
       associate (n => self%n_known)
          place = findloc(abs(self%known(:n)%omega - omega) <= 0.0_wp, .true., dim=1)
          if (place > 0) return
-         place = min(n + 1, size(self%known))
-         if (abs(self%known(place)%omega - omega) <= 0.0_wp) return
-         ! Rows of the sweep come first: all of them are asked for by the tuned disk.
-         if (n < size(self%known) - 1) self%n_known = n + 1
+         place = n + 1
+         if (self%is_shared .and. n < size(self%known) - 1) then
+            self%n_known = n + 1
+         else
+            place = size(self%known)
+            if (abs(self%known(place)%omega - omega) <= 0.0_wp) return
+         end if
       end associate
-      call solve_tuned(self, omega, self%known(place), error)
+      if (allocated(self%modal)) then
+         call solve_modal(self, omega, self%known(place))
+      else
+         call solve_tuned(self, omega, self%known(place), error)
+      end if
    end subroutine find_tuned
+
+   !> The same by the modes of the tuned disk.
+   subroutine solve_modal(self, omega, tuned)
+      class(linear_response), intent(in) :: self
+      real(wp), intent(in) :: omega
+      type(tuned_type), intent(inout) :: tuned
+      complex(wp), allocatable :: by_load(:, :), by_force(:, :, :)
+      integer :: n, r
+      logical :: failed
+
+      r = size(self%base%rows, 1)
+      n = self%n_observed
+      allocate (by_force(n + r, r, self%n_sectors), by_load(n + r, self%n_sectors))
+      call self%modal%answer_by_modes(omega, by_force, by_load, failed)
+      tuned%omega = omega
+      tuned%is_solved = .not. failed
+      if (failed) return
+      tuned%gamma = by_force(n + 1:, :, :)
+      tuned%shown = by_force(:n, :, :)
+      tuned%rows = by_load(n + 1:, :)
+      tuned%observed = by_load(:n, :)
+   end subroutine solve_modal
 
    !> Answers of the tuned disk to its load, and to a force on each row of sector 0.
    subroutine solve_tuned(self, omega, tuned, error)

@@ -6,17 +6,21 @@ module fw_run_population
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_analysis, only: analysis, run_type
    use fw_blade_peaks, only: blade_peaks, blade_response
+   use fw_all_sectors, only: all_sectors, new_all_sectors
    use fw_case, only: case_type
+   use fw_cyclic_relative, only: cyclic_relative, new_cyclic_relative
    use fw_error, only: error_type, fatal_error, status_input, status_stopped
    use fw_frequency_response, only: new_strategy
    use fw_kinds, only: wp
    use fw_linear_blades, only: linear_response
    use fw_memory, only: require_memory
+   use fw_model, only: model_type
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_population_group, only: population_group
    use fw_problem, only: build_system
    use fw_response_quantity, only: of_first_harmonic
+   use fw_sector_means, only: means_none
    use fw_size_options, only: sizes
    use fw_strategy, only: new_request, point_strategy
    use fw_sweep, only: sweep_places
@@ -44,6 +48,9 @@ module fw_run_population
       procedure :: begin => begin_balanced
       procedure :: at => solve_balanced
    end type balanced_response
+
+   !> Frequencies between the rows of a sweep that are kept for all disks, for each row.
+   integer, parameter :: shared_per_row = 16
 
 contains
 
@@ -153,13 +160,50 @@ contains
       linear%base = case%model%cyclic%deviation
       linear%patterns = case%population%blades
       call new_case(case, 0, one)
-      one%model%cyclic%deviation = linear%base
-      one%model%cyclic%deviation%part = 0.0_wp
-      call build_system(one, linear%problem, linear%system, error)
+      call build_modal(one, linear%base%rows, linear%modal, error)
+      if (.not. allocated(error) .and. .not. allocated(linear%modal)) then
+         one%model%cyclic%deviation = linear%base
+         one%model%cyclic%deviation%part = 0.0_wp
+         call build_system(one, linear%problem, linear%system, error)
+      end if
       if (.not. allocated(error)) call reserve_linear(case, linear, error)
    end subroutine build_linear
 
-   !> Room for the tuned disk at all rows of the sweep.
+   !> The tuned disk by the modes of its nodal diameters, the rows behind what is observed of it.
+   !> Not allocated where modes without damping are in the range, or more than K, M and C acts.
+   subroutine build_modal(case, rows, modal, error)
+      !> Of the tuned disk.
+      class(case_type), intent(in) :: case
+      !> (n_rows, n_dof)
+      real(wp), intent(in) :: rows(:, :)
+      type(all_sectors), allocatable, intent(out) :: modal
+      type(error_type), allocatable, intent(out) :: error
+      type(model_type), allocatable :: model
+      type(cyclic_relative) :: relative
+      real(wp), allocatable :: observe(:, :)
+
+      if (case%model%cyclic%has_nodal() .or. allocated(case%model%cyclic%speed)) return
+      allocate (model)
+      model = case%model
+      associate (n => size(model%observe_matrix, 1))
+         allocate (observe(n + size(rows, 1), size(rows, 2)))
+         observe(:n, :) = model%observe_matrix
+         observe(n + 1:, :) = rows
+      end associate
+      call move_alloc(observe, model%observe_matrix)
+      call new_cyclic_relative(model, [integer ::], [integer ::], [integer ::], relative)
+      allocate (modal)
+      call new_all_sectors(model, relative, [1], case%sweep%range(), means_none, modal, error)
+      if (allocated(error)) return
+      if (modal%is_modal()) then
+         call modal%drop_round_off()
+      else
+         deallocate (modal)
+      end if
+   end subroutine build_modal
+
+   !> Room for the tuned disk at the frequencies that disks share: all rows of the sweep, most of
+   !> what is looked at between them.
    subroutine reserve_linear(case, linear, error)
       type(case_type), intent(in) :: case
       type(linear_response), intent(inout) :: linear
@@ -168,11 +212,12 @@ contains
 
       n = linear%n_sectors
       r = size(linear%base%rows, 1)
-      n_reals = 2.0_wp*(n*r)**2 + 8.0_wp*n*case%sweep%n_points*(r + 1.0_wp)*(r + linear%n_observed)
+      n_reals = 2.0_wp*(n*r)**2 + 2.0_wp*shared_per_row*n*case%sweep%n_points* &
+                (r + 1.0_wp)*(r + linear%n_observed)
       call require_memory(n_reals, '&population with sweep%n_points = '// &
                           to_text(case%sweep%n_points)//' and '//to_text(nint(n*r))//' rows of '// &
                           'all sectors', 'take fewer points or rows', error)
-      if (.not. allocated(error)) call linear%reserve(4*case%sweep%n_points)
+      if (.not. allocated(error)) call linear%reserve(shared_per_row*case%sweep%n_points)
    end subroutine reserve_linear
 
    !> The tuned disk, then pattern after pattern.

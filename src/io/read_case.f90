@@ -319,6 +319,10 @@ contains
       else if (order > 0.0_wp) then
          ! Polynomials in the speed hold between the speeds that they go through.
          speeds = case%sweep%range()/order
+         ! A resonance may leave the sweep by half of it.
+         if (analyses(case%analysis)%is_resonance) speeds = &
+            [max(1.5_wp*speeds(1) - 0.5_wp*speeds(2), 0.1_wp*speeds(1)), &
+             1.5_wp*speeds(2) - 0.5_wp*speeds(1)]
          associate (growth => case%model%cyclic%speed%growth)
             if (speeds(1) < (1.0_wp - round_off)*growth%lowest .or. &
                 speeds(2) > (1.0_wp + round_off)*growth%highest) call reader%refuse( &

@@ -76,6 +76,9 @@ module fw_all_sectors
       procedure :: take_deviation
       procedure :: pulls_observed
       procedure :: pull_observed
+      procedure :: is_modal
+      procedure :: drop_round_off
+      procedure :: answer_by_modes
    end type all_sectors
 
    type, extends(structure_state) :: all_sectors_state
@@ -172,6 +175,23 @@ module fw_all_sectors
          complex(wp), intent(in) :: q(:, :)
          complex(wp), intent(out) :: slope(:, :)
       end subroutine observed_slope
+
+      !> Take off what couples condensed modes by round-off alone, as where these give the damping:
+      !> parts of the damping of each two of them below 1e-9.
+      pure module subroutine drop_round_off(self)
+         class(all_sectors), intent(inout) :: self
+      end subroutine drop_round_off
+
+      !> Of sectors that are condensed whole (is_modal): observed quantities of sector j by a force
+      !> along each of the last of them in sector 0, and by the load, of the first harmonic.
+      module subroutine answer_by_modes(self, omega, by_force, by_load, failed)
+         class(all_sectors), intent(in) :: self
+         !> [rad/s]
+         real(wp), intent(in) :: omega
+         !> (n_observed of a sector, n_forced, n_sectors), (n_observed of a sector, n_sectors).
+         complex(wp), intent(out) :: by_force(:, :, :), by_load(:, :)
+         logical, intent(out) :: failed
+      end subroutine answer_by_modes
 
       !> Of all sectors: the load is one wave, on which only that wave of the motion works.
       module subroutine load_work(self, state, h, q, work, slope, row)
@@ -509,6 +529,19 @@ contains
       end select
       call coefficients_of(self%harmonic, self%column, m, m, amplitude, slope)
    end subroutine derivative
+
+   !> Whether everything is condensed, with nothing beside K, M and C.
+   pure logical function is_modal(self)
+      class(all_sectors), intent(in) :: self
+      integer :: k
+
+      is_modal = self%n_slots == 0
+      do k = 1, size(self%basis)
+         is_modal = is_modal .and. .not. (allocated(self%basis(k)%structural) .or. &
+                                          allocated(self%basis(k)%circulatory) .or. &
+                                          allocated(self%basis(k)%speed))
+      end do
+   end function is_modal
 
    pure integer function n_own(self)
       class(all_sectors), intent(in) :: self

@@ -1,7 +1,7 @@
 !> All sectors at once: what is observed in each of them, and the work of their load, wave by wave.
 submodule(fw_all_sectors) fw_all_sectors_observed
-   use fw_sector_stiffness, only: observed_by_sector, observed_sector_slope, recover_sector, &
-      work_of_sector
+   use fw_sector_stiffness, only: answer_of_modes, observed_by_sector, observed_sector_slope, &
+      recover_sector, work_of_sector
    implicit none (type, external)
 
 contains
@@ -27,6 +27,54 @@ contains
          end do
       end select
    end procedure recover
+
+   ! Modes are known to round-off times the condition of the mass matrix; what this couples is
+   ! nothing beside their own damping, even of two that resonate together.
+   module procedure drop_round_off
+      real(wp), parameter :: nothing = 1.0e-9_wp
+      real(wp), allocatable :: root(:)
+      logical :: is_coupled
+      integer :: i, j, k
+
+      do k = 1, size(self%basis)
+         if (.not. allocated(self%basis(k)%c_ii)) cycle
+         associate (c => self%basis(k)%c_ii)
+            root = [(sqrt(max(real(c(i, i), wp), 0.0_wp)), i=1, size(c, 1))]
+            is_coupled = .false.
+            do j = 1, size(c, 2)
+               is_coupled = is_coupled .or. any(abs(c(:j - 1, j)) > nothing*root(:j - 1)*root(j)) &
+                            .or. any(abs(c(j + 1:, j)) > nothing*root(j + 1:)*root(j))
+            end do
+         end associate
+         if (.not. is_coupled) deallocate (self%basis(k)%c_ii)
+      end do
+   end procedure drop_round_off
+
+   ! A force on one sector is all waves in equal shares; the load is one of them.
+   module procedure answer_by_modes
+      complex(wp), allocatable :: answer(:, :, :)
+      type(harmonic_point) :: point
+      integer :: a, k, n_forced
+
+      n_forced = size(by_force, 2)
+      allocate (answer(size(by_load, 1), self%n_alike, n_forced + 1))
+      point%harmonic = 1
+      point%theta = cmplx(omega**2, kind=wp)
+      point%s = omega
+      do k = 0, self%n_alike - 1
+         point%conjugated = 2*k > self%n_alike
+         point%is_loaded = modulo(self%cyclic%nodal_diameter(1) - k, self%n_alike) == 0
+         call answer_of_modes(self%basis(basis_of(self, k)), point, n_forced, &
+                              answer(:, k + 1, :), failed)
+         if (failed) return
+      end do
+      do a = 1, n_forced
+         answer(:, :, a) = answer(:, :, a)/self%n_alike
+         call self%observed_ring%add_waves(answer(:, :, a), by_load)
+         by_force(:, a, :) = by_load
+      end do
+      call self%observed_ring%add_waves(answer(:, :, n_forced + 1), by_load)
+   end procedure answer_by_modes
 
    ! The transforms are unitary but for N, which the waves of the slopes take: the same ones serve
    ! on the way back, with the conjugate transpose of each wave between them.

@@ -14,7 +14,7 @@ module fw_sector_stiffness
    private
 
    public :: harmonic_point, slopes_of, form_sector, derive_sector, recover_sector
-   public :: observed_by_sector, observed_sector_slope, work_of_sector
+   public :: observed_by_sector, observed_sector_slope, work_of_sector, answer_of_modes
 
    !> Where a harmonic stands: factors of K, M and C in Z = k K - theta M + i s C.
    type :: harmonic_point
@@ -166,6 +166,28 @@ contains
          matrix = matrix - matmul(turned(basis%observe_i, point), z_iq)
       end associate
    end subroutine observed_by_sector
+
+   !> Observed quantities of a sector that is condensed whole, by a force along each of the last of
+   !> them, then by the load.
+   subroutine answer_of_modes(basis, point, n_forced, answer, failed)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      integer, intent(in) :: n_forced
+      !> (n_observed, n_forced + 1)
+      complex(wp), intent(out) :: answer(:, :)
+      logical, intent(out) :: failed
+      type(internal_block) :: internal
+      complex(wp), allocatable :: observe(:, :), x(:, :)
+
+      call factor_internal(basis, point, internal, failed)
+      if (failed) return
+      observe = turned(basis%observe_i, point)
+      allocate (x(basis%n_internal, n_forced + 1))
+      x(:, :n_forced) = conjg(transpose(observe(size(observe, 1) - n_forced + 1:, :)))
+      x(:, n_forced + 1) = load_of(basis, basis%load_i, point)
+      call internal%solve(n_forced + 1, x)
+      answer = matmul(observe, x)
+   end subroutine answer_of_modes
 
    !> Observed quantities by the frequency at held coordinates: the internal modes follow.
    subroutine observed_sector_slope(basis, point, slopes, load_factor, q, slope)

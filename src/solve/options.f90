@@ -196,7 +196,8 @@ contains
                          only="springs, law = 'penalty', 'regularised'"), self%stability)
       call keys%bind(key('speed_order', 'the rotation speed is the frequency over this: 1 for '// &
                          'unbalance, an engine order of the loads; 0: it does not follow', &
-                         at_least(0.0_wp), only="analysis = 'frf', 'point', 'population'"), &
+                         at_least(0.0_wp), only="analysis = 'frf', 'point', 'population', "// &
+                              "'resonance'"), &
                      self%speed_order)
       call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
                          only="analysis = 'frf', continuation = 'natural'"), self%refine)

@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from annulus import random_case
+from annulus import mistuned, random_case
 from cases import read, run, run_reference
 from cyclic_cases import difference
 from deviations import annulus, draw, write
@@ -90,6 +90,41 @@ def test_a_turned_pattern_turns_the_answer(tmp_path):
     phase = np.exp(-2j * np.pi * case["engine_order"] / n * np.arange(1, 4))[None, :, None]
     wanted = np.roll(amplitude.reshape(3, 3, n, -1), 1, axis=2).reshape(amplitude.shape) * phase
     assert difference(turned[:, 1::2] - 1j * turned[:, 2::2], wanted) < EQUAL
+
+
+def repeated(case, parts, times):
+    """The disk of so many times the sectors, with the same pattern again and again."""
+    n = case["n_sectors"]
+    contact = {key: values if key in ("side_1", "side_2", "sector_2") else values * times
+               for key, values in case["contact"].items()}
+    larger = {**case, "n_sectors": times * n, "engine_order": times * case["engine_order"],
+              "contact": contact}
+    return larger, parts | {"frequency": np.tile(parts["frequency"], (times, 1))}
+
+
+def test_a_pattern_again_and_again_is_that_of_a_small_disk(tmp_path):
+    """More coordinates than matrices of all sectors are factored of: contact of each sector in the
+    preconditioner, and its transpose."""
+    rng, case = sector()
+    parts = with_rows(rng, case)
+    # Waves that take the mean of the contact need over 30 steps of GMRES here.
+    case["model"]["damping"] = (0.03 * np.array(case["model"]["damping"])).tolist()
+    case = mistuned(rng, case, 0.8)
+    asked = {"sensitivity": {"parameters": ["mistuning%frequency"], "quantities": ["dissipation"]},
+             "solver": {"tolerance": 1e-12}}
+    times = 80
+    found = []
+    for name, disk in (("small", (case, parts)), ("large", repeated(case, parts, times))):
+        solve(tmp_path / name, *disk, omegas=(0.8,), **asked)
+        found.append(read(tmp_path / name / "case.h5"))
+    small, large = found
+    n = case["n_sectors"] * len(case["model"]["mass"])
+    assert difference(large["coefficients"][..., :n], small["coefficients"]) < EQUAL
+    assert difference(large["coefficients"][..., -n:], small["coefficients"]) < EQUAL
+    # The work of all sectors by the frequency of one blade, of all repetitions together.
+    name = "sensitivity/dissipation/mistuning_frequency"
+    by_blade = large[name].reshape(times, -1).sum(axis=0) / times
+    assert difference(by_blade, small[name].ravel()) < 1e-7
 
 
 def test_many_modes_are_those_of_the_annulus(tmp_path):

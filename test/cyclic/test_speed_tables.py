@@ -205,3 +205,30 @@ def test_wrong_tables_are_refused_in_words(tmp_path, changes, groups, told):
             del group[key]
     words = run(tmp_path, case, status=3).stderr
     assert told in words
+
+
+def test_a_resonance_stays_between_the_speeds(tmp_path):
+    """It may leave the sweep by half of it; sectors that differ have one highest point."""
+    groups, _ = disk(tmp_path, 2)
+    with h5py.File(tmp_path / "model.h5") as file:
+        low, high = ORDER * file["speed/value"][[0, -1]]
+    resonance = {"parameter": "load%harmonic_scale", "start": 1.0, "end": 1.2, "n_points": 2}
+    asked = groups | {"case": {"analysis": "resonance"}, "resonance": resonance}
+    done = run(tmp_path, with_model(asked | {"sweep": {
+        "start": low + 1e-3, "end": high, "n_points": 9, "speed_order": ORDER}}), status=3)
+    assert "asks for speeds" in done.stderr
+    width = high - low
+    sweep = {"start": low + 0.3 * width, "end": high - 0.3 * width, "n_points": 41,
+             "speed_order": ORDER}
+    run(tmp_path, with_model(asked | {"sweep": sweep}), status=(0, 4))
+    found = read(tmp_path / "case.h5")
+    assert found["converged"].any()
+    for k in np.flatnonzero(found["converged"]):
+        omega = found["omega"][k]
+        assert abs(found["speed"][k] * ORDER / omega - 1.0) < 1e-14
+        run(tmp_path, with_model(groups | {
+            "load": {"harmonic_scale": float(found["parameter"][k])},
+            "sweep": {"values": [omega], "speed_order": ORDER}}), name="point")
+        c = read(tmp_path / "point.h5")["coefficients"][0]
+        height = np.ravel(found["resonance/first_harmonic"][k])[0]
+        assert abs(np.hypot(c[1], c[2])[0] / height - 1.0) < 1e-6

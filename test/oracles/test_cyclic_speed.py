@@ -120,7 +120,39 @@ def test_another_order_is_remarked(tmp_path, order, said):
 
 @pytest.mark.parametrize(("changes", "words"), [
     ({"model": {"modal_damping": 0.01}}, "does not go with model%modal_damping"),
-    ({"model": {"rotation_speed": 0.3}}, "does not go with model%rotation_speed")])
+    ({"model": {"rotation_speed": 0.3}}, "does not go with model%rotation_speed"),
+    ({"case": {"analysis": "resonance"}, "resonance": {
+        "parameter": "model%rayleigh_stiffness", "start": 0.01, "end": 0.02, "n_points": 3},
+      "sweep": {"values": None, "start": 0.7, "end": 1.2, "n_points": 9}},
+     "does not go with a resonance%parameter of the matrices")])
 def test_what_does_not_go_is_refused(tmp_path, changes, words):
     write_model(tmp_path / "model.h5")
     assert words in run(tmp_path, case_of(1, **changes), status=3).stderr
+
+
+@pytest.mark.parametrize("engine_order", [4, -2])
+def test_a_resonance_along_an_engine_order(tmp_path, engine_order):
+    """Each row of a resonance is the highest point of its line, at its own speed."""
+    write_model(tmp_path / "model.h5")
+    case = case_of(0, case={"analysis": "resonance"}, cyclic={"engine_order": engine_order},
+                   harmonics={"n_time": 1024, "sampling": None})
+    case["sweep"] = {"start": 0.6, "end": 1.6, "n_points": 41, "speed_order": 4}
+    case["resonance"] = {"parameter": "load%harmonic_scale", "start": 1.0, "end": 1.6,
+                         "n_points": 3}
+    run_case(tmp_path, case)
+    found = read(tmp_path / "case.h5")
+    assert found["converged"].all() and len(found["omega"]) == 3
+    assert np.abs(found["speed"] * 4.0 / found["omega"] - 1.0).max() < 1e-14
+    del case["resonance"]
+    for omega, scale, height in zip(found["omega"], found["parameter"],
+                                    found["resonance/first_harmonic"]):
+        values = (omega * (1.0 + 1e-3 * np.arange(-2, 3))).tolist()
+        rows = run_case(tmp_path, merged(case, {
+            "case": {"analysis": "frf"}, "load": {"harmonic_scale": float(scale)},
+            "sweep": {"values": values, "speed_order": 4, "start": None, "end": None,
+                      "n_points": None}}))
+        line = np.hypot(rows.coefficients[:, 1, 0], rows.coefficients[:, 2, 0])
+        assert abs(line[2] / np.ravel(height)[0] - 1.0) < 1e-7
+        # Contact decided at instants jumps by about the square of their distance.
+        assert line.max() < line[2] * (1.0 + 1e-5)
+        assert line[[0, 4]].max() < line[2]
