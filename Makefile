@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz notebooks wheel ways sensitivities resonances modes calibration stops controls
 .PHONY: parameters family
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
-.PHONY: bench-peers bench-full compare disk paper
+.PHONY: bench-peers bench-full compare disk mistuned-disk paper
 .PHONY: thresholds
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
@@ -170,6 +170,10 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 
 disk: build ## tables and pictures of docs/shrouded_disk.md
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk --build $(BUILD)
+
+mistuned-disk: build ## figures and pictures of docs/mistuned_disk.md
+	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk.mistuned
+	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk.amplification
 
 BEFORE ?=
 rest: build ## where pairs of the velocity law come to rest, also of a program BEFORE

@@ -13,8 +13,8 @@ fretwear.analyses
     Runs of the library in this process.
 fretwear.steps
     A case frequency by frequency.
-fretwear.populations
-    Many disks whose blades differ at random.
+fretwear.populations, fretwear.worst_pattern
+    Many disks whose blades differ at random; the pattern that amplifies most.
 fretwear.design
     Optimisation and calibration of the parameters of a case.
 fretwear.result, fretwear.bifurcation

@@ -20,9 +20,11 @@ __all__ = ["WorstPattern", "worst_pattern"]
 
 Floats = NDArray[np.float64]
 
-#: Steps along the slope that are tried at once, in parts of the one that moves a blade across the
-#: box.
-_TRIED = (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4)
+#: Steps that are tried at once: along the slope, in parts of the one that moves a blade across the
+#: box, and along the way of BFGS, in parts of what that says.
+_UPHILL, _CURVED = (1.0, 0.1, 0.01, 1e-3), (2.0, 1.0, 0.5, 0.2, 0.05)
+#: Changes of slopes that are kept for it.
+_MEMORY = 12
 #: A start has ended where a step brings less than this part of its amplification.
 _ENOUGH = 1e-6
 _MOST_STEPS = 60
@@ -133,6 +135,38 @@ def worst_pattern(case: Case | str | Path, box: float = 0.05, *, starts: int | A
                         int(at.sector[best]), at.amplification, at.patterns, at.ended)
 
 
+class _Memory:
+    """Changes of place and slope along the ascent of a start, by which BFGS bends its way."""
+
+    def __init__(self) -> None:
+        self._last: tuple[Floats, Floats] | None = None
+        self._pairs: list[tuple[Floats, Floats]] = []
+
+    def remember(self, place: Floats, slope: Floats) -> None:
+        """A further place with its slope."""
+        if self._last is not None:
+            move, change = place - self._last[0], self._last[1] - slope
+            # Where the slope grows along the way there is no summit to be told.
+            if (move * change).sum() > 1e-10 * np.linalg.norm(move) * np.linalg.norm(change):
+                self._pairs = [*self._pairs, (move, change)][-_MEMORY:]
+        self._last = place.copy(), slope.copy()
+
+    def way(self, slope: Floats, moves: NDArray[np.bool_]) -> Floats:
+        """Slope times the inverse of the curvature, of what may move."""
+        way, parts = np.where(moves, slope, 0.0), []
+        pairs = [(move * moves, change * moves) for move, change in self._pairs]
+        pairs = [(move, change) for move, change in pairs if (move * change).sum() > 0.0]
+        for move, change in reversed(pairs):
+            parts.append((move * way).sum() / (move * change).sum())
+            way = way - parts[-1] * change
+        if pairs:
+            move, change = pairs[-1]
+            way = way * (move * change).sum() / (change * change).sum()
+        for (move, change), part in zip(pairs, reversed(parts)):
+            way = way + (part - (change * way).sum() / (move * change).sum()) * move
+        return np.where(moves, way, 0.0)
+
+
 @dataclass
 class _Places:
     """Where the starts have come."""
@@ -142,6 +176,7 @@ class _Places:
     omega: Floats
     sector: NDArray[np.int64]
     ended: NDArray[np.bool_]
+    memory: list[_Memory]
 
 
 class _Search:
@@ -170,25 +205,22 @@ class _Search:
             raise ConvergenceError("no start was solved anywhere: take another &sweep, or fewer "
                                    "harmonics", None)
         return _Places(patterns, amplification, found.omega[:, self.observe],
-                       found.sector[:, self.observe], ~np.isfinite(amplification))
+                       found.sector[:, self.observe], ~np.isfinite(amplification),
+                       [_Memory() for _ in patterns])
 
     def _solve(self, patterns: Floats) -> Population:
         return population(self.case, patterns, workers=self.workers, stop=self.stop)
 
     def climb(self, at: _Places, moving: NDArray[np.int64]) -> None:
-        """One step of each start that has not ended: the best of several lengths."""
+        """One step of each start that has not ended: the best of several."""
         slopes = self._slopes(at, moving)
-        size = np.abs(slopes).reshape(len(moving), -1).max(axis=1)
-        size = np.where(size > 0.0, size, 1.0)
-        ways = 2.0 * self.box * slopes / size.reshape(-1, *[1] * (slopes.ndim - 1))
-        tried = np.clip(at.patterns[moving][:, None] + np.array(_TRIED).reshape(
-            1, -1, *[1] * (slopes.ndim - 1)) * ways[:, None], -self.box, self.box)
+        tried = np.array([self._tried(at, place, slope) for place, slope in zip(moving, slopes)])
         found = self._solve(tried.reshape(-1, *slopes.shape[1:]))
         values = found.amplification[:, self.observe].reshape(len(moving), -1)
         values = np.where(np.isfinite(values), values, -np.inf)
         best = values.argmax(axis=1)
         for k, place in enumerate(moving):
-            row = k * len(_TRIED) + int(best[k])
+            row = k * tried.shape[1] + int(best[k])
             if not values[k, best[k]] > at.amplification[place]:
                 at.ended[place] = True
                 continue
@@ -197,6 +229,18 @@ class _Search:
             at.amplification[place] = values[k, best[k]]
             at.omega[place] = found.omega[row, self.observe]
             at.sector[place] = found.sector[row, self.observe]
+
+    def _tried(self, at: _Places, place: int, slope: Floats) -> Floats:
+        """Patterns to try from where a start has come (n, ..), inside of the box."""
+        here = at.patterns[place]
+        at.memory[place].remember(here, slope)
+        outward = (np.abs(here) >= self.box) & (here * slope > 0.0)
+        free = np.where(outward, 0.0, slope)
+        size = np.abs(free).max()
+        uphill = 2.0 * self.box * free / size if size > 0.0 else free
+        curved = at.memory[place].way(free, ~outward)
+        return np.clip(here + np.array([part * way for parts, way in (
+            (_UPHILL, uphill), (_CURVED, curved)) for part in parts]), -self.box, self.box)
 
     def _slopes(self, at: _Places, moving: NDArray[np.int64]) -> Floats:
         """Derivatives of the largest first harmonics by the patterns; 0 where none is known."""

@@ -1,11 +1,16 @@
 """Populations of mistuned disks: seeds, workers, restart, quantiles, the command, the picture."""
 
+import signal
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from limits import limit
 
 import fretwear as fw
 from fretwear.cli import main
@@ -72,6 +77,32 @@ def test_workers_and_stops_do_not_change_the_numbers(tmp_path: Path,
                                    progress=lambda done, total: pytest.fail("solved again")))
     with pytest.raises(fw.InputError, match="is not of this input"):
         fw.population(disk(pairs), n, seed=6, contact=contact, file=file)
+
+
+def test_what_was_killed_goes_on(tmp_path: Path) -> None:
+    """The process is killed while it solves; the file it leaves is whole, and no digit differs."""
+    case = disk()
+    assert case.model is not None
+    case.model.save(tmp_path / "model.h5")
+    (tmp_path / "case.nml").write_text(
+        "&model source = 'hdf5' file = 'model.h5' /\n&cyclic engine_order = 2 mistuned = .true. /\n"
+        "&sweep start = 0.6 end = 1.6 n_points = 41 /\n&harmonics n_harmonics = 1 /\n")
+    file, n = tmp_path / "killed.h5", 500
+    words = [sys.executable, "-m", "fretwear", "population", str(tmp_path / "case.nml"),
+             "--patterns", str(n), "--seed", "3", "--workers", "2", "-q", "-o", str(file)]
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+    until = time.monotonic() + limit(120.0)
+    while not file.exists() and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    with h5py.File(file) as kept:
+        assert 0 < kept["population/done"][()].sum() < n
+    assert main(words[3:]) == 0
+    assert main([*words[3:-1], str(tmp_path / "whole.h5")]) == 0
+    with h5py.File(file) as one, h5py.File(tmp_path / "whole.h5") as other:
+        for name in ("amplitude", "omega", "sector", "amplification", "tuned", "patterns"):
+            assert np.array_equal(one[f"population/{name}"], other[f"population/{name}"])
 
 
 def test_contact_is_drawn_behind_the_patterns() -> None:

@@ -16,6 +16,7 @@ from fretwear.disk import DiskParameters, build_full
 from fretwear.disk.cli import main
 from fretwear.disk.model import FullDisk, reduced_system
 from fretwear.disk.stress import find_stress
+from fretwear.export import export_mesh
 from fretwear.sector.assembly import Assembly
 from fretwear.sector.parameters import Material
 from fretwear.sector.stress import stress_points
@@ -175,3 +176,30 @@ def test_stress_of_a_wave_tends_to_that_of_the_full_sector(full: FullDisk) -> No
         errors.append(np.abs(found - wanted).max() / np.abs(wanted).max())
     print("errors of the stress with 10, 40, 160 modes:", errors)
     assert errors[0] < 0.1 and errors[1] < 0.3 * errors[0] and errors[2] < 0.3 * errors[1]
+
+
+def test_export_shows_the_stress_of_vertices(tmp_path: Path) -> None:
+    pytest.importorskip("meshio")
+    write_disk(tmp_path / "disk.h5", 20, "--stress", "--mesh")
+    (tmp_path / "case.nml").write_text(
+        "&case analysis = 'point' /\n&model source = 'hdf5' file = 'disk.h5'\n"
+        "   rayleigh_stiffness = 1e-6 rotation_speed = 400.0 /\n&cyclic engine_order = 3 /\n"
+        "&contact law = 'penalty' tangential_stiffness = 1e4 normal_stiffness = 1e4 gap = 1.0 /\n"
+        "&harmonics n_harmonics = 1 /\n&sweep start = 1500.0 /\n&output contact = .true. /\n"
+        "&stress endurance = 250.0 ultimate = 900.0 /\n")
+    result = run(tmp_path / "case.nml", tmp_path / "case.h5")
+    mesh = export_mesh(result, sectors=2)
+    with h5py.File(tmp_path / "disk.h5") as file:
+        vertex = file["stress/mesh_point"][()]
+        n_points = len(file["mesh/points"])
+    for name in ("stress_amplitude", "stress_mean", "utilisation"):
+        shown = mesh.point_data[name].reshape(2, n_points)
+        assert np.isfinite(shown).all() and np.array_equal(shown[0], shown[1])
+        values = result[f"stress/{name.removeprefix('stress_')}"][0]
+        # Of the blade and the disk where they meet, the one that vibrates more.
+        one = int(np.flatnonzero(np.bincount(vertex[vertex >= 0]) == 2)[0])
+        both = np.flatnonzero(vertex == one)
+        larger = both[result["stress/amplitude"][0, both].argmax()]
+        assert shown[0, one] == values[larger]
+        alone = int(np.flatnonzero(np.bincount(vertex[vertex >= 0]) == 1)[0])
+        assert shown[0, alone] == values[vertex == alone][0]

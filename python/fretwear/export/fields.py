@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,7 +53,8 @@ def export_mesh(result: Result | str | Path, point: int | None = None,
         `displacement_static`, `displacement_cosine`, `displacement_sine` (first harmonic) and
         `vibration`, the largest distance from the static position. Cell data: `body`, `pair`
         (from 1; 0 on others), and `pair_fields`, NaN on others; of several sectors
-        `sector`.
+        `sector`. Where the model has rows of stress at points of the mesh, point data
+        `stress_amplitude`, `stress_mean` and `utilisation`, NaN at others.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class Fields:
         self.turns = _turns(result, sectors, axis)
         self.mesh: RecoveryMesh = read_mesh(result.model_file)
         self.pairs = pair_fields(result, point)
+        self.stress = _stress(result, point, len(self.mesh.points))
         self.coefficients: Floats | None = None
         if "contact/force" in result or "wear/depth" not in result:
             recovered = recover_displacement(result, points=[point])[point]
@@ -135,7 +138,9 @@ class Fields:
         return meshio.Mesh(np.concatenate([points @ turn.T for _, turn in self.turns]),
                            [(name, np.concatenate([corners + k for k in shift]))
                             for name, corners, _, _ in parts],
-                           point_data=self._point_data(phase), cell_data=cell_data)
+                           point_data=self._point_data(phase) | {
+                               name: np.tile(values, n) for name, (values, _) in
+                               self.stress.items()}, cell_data=cell_data)
 
     def summary(self) -> str:
         """Fields with their units and largest values, one line each."""
@@ -146,10 +151,31 @@ class Fields:
                  "contact" + (f", {n} sectors" if n > 1 else "")]
         shown = {name: (np.linalg.norm(values, axis=1) if values.ndim == 2 else values, length)
                  for name, values in self._point_data(None).items()}
-        for name, (values, units) in {**shown, **self.pairs}.items():
+        for name, (values, units) in {**shown, **self.stress, **self.pairs}.items():
             lines.append(f"  {name:20s} {np.nanmin(values):12.5g} to {np.nanmax(values):12.5g} "
                          f"{units}")
         return "\n".join(lines)
+
+
+def _stress(result: Result, point: int, n_points: int) -> dict[str, tuple[Floats, str]]:
+    """Stress at the points of the mesh, with units; of several bodies at one point the largest."""
+    if "stress/amplitude" not in result or "blades/largest" in result:
+        return {}
+    with h5py.File(result.model_file, "r") as file:
+        if "stress/mesh_point" not in file:
+            return {}
+        at = file["stress/mesh_point"][()]
+    there = np.flatnonzero((at >= 0) & (at < n_points))
+    # The last one stays: that of the largest amplitude.
+    there = there[np.argsort(result["stress/amplitude"][point, there], kind="stable")]
+    found = {}
+    for name, shown in (("amplitude", "stress_amplitude"), ("mean", "stress_mean"),
+                        ("utilisation", "utilisation")):
+        if f"stress/{name}" in result and len(there):
+            values = np.full(n_points, np.nan)
+            values[at[there]] = result[f"stress/{name}"][point, there]
+            found[shown] = values, result.units(f"stress/{name}")
+    return found
 
 
 def _turns(result: Result, sectors: int, axis: str) -> list[tuple[float, Floats]]:

@@ -16,6 +16,7 @@ from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
+from .haigh import plot_haigh
 from .mission import plot_mission
 from .mode import plot_mode
 from .population import plot_population
@@ -136,6 +137,9 @@ KINDS: dict[str, Kind] = {
                      lambda r, c: plot_campbell_result(r)),
     "population": Kind("Amplification of many disks", _has("population/amplification"),
                        lambda r, c: plot_population(r, c.observe)),
+    "haigh": Kind("Stress amplitude over mean stress", lambda r: (
+        "stress/amplitude" in r and r.n_points > 0 and bool(r.converged.any())),
+        lambda r, c: plot_haigh(r, c.point)),
     "mode": Kind("Nonlinear mode", _is_mode, lambda r, c: plot_mode(r)),
     "backbone": Kind("Backbone of the mode", _is_mode, lambda r, c: plot_backbone(r, c.observe)),
     "resonance": Kind("Resonance over a parameter", _is_resonance, lambda r, c: plot_resonance(r)),
