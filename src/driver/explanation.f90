@@ -94,7 +94,8 @@ contains
 
       associate (failure => self%item(place))
          text = 'no solution at '//trim(shown(failure%omega))//' rad/s'
-         if (failure%n_points > 1) text = text//' and at '//to_text(failure%n_points - 1)// &
+         if (failure%n_points == 2) text = text//' and at the point behind it'
+         if (failure%n_points > 2) text = text//' and at '//to_text(failure%n_points - 1)// &
                                           ' points behind it'
          if (failure%account /= '') text = text//': '//trim(failure%account)
       end associate

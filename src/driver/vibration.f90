@@ -236,16 +236,17 @@ contains
       if (self%known%kept == 0) return
       if (abs(self%known%place(1) - self%wanted%along) > 0.0_wp) then
          words = trim(words)//'; the last solution is at '//shown(self%known%place(1))
-         if (turns(self%known)) words = trim(words)//', where the curve turns: a fold, which '// &
-                                        'continuation = ''arclength'' follows'
+         if (turns(self%known)) words = trim(words)//', where the curve grows steeper, as '// &
+                                        'before a fold: continuation = ''arclength'' follows one'
       end if
    end function account
 
    !> Whether the last solutions change ever faster, by their distances over those of their places.
    pure logical function turns(known)
       type(solution_history), intent(in) :: known
-      !> Slopes over each other: along a curve that turns back they grow without bound.
-      real(wp), parameter :: steeper = 2.0_wp
+      !> The last two slopes over each other: those of a root whose end is within the next step are
+      !> 1.3 to 2.4.
+      real(wp), parameter :: steeper = 1.3_wp
       real(wp) :: slope(2), step
       integer :: k
 

@@ -48,11 +48,23 @@ def test_a_periodic_motion_is_found_with_its_amplitude(fw_run):
         amplitude = file["amplitude"][0, 0]
     said = explained(fw_run, text + NO_WAY)
     assert len(said) == 1
-    assert "no solution at 1.10000E+00 rad/s and at 1 points behind it" in said[0]
+    assert "no solution at 1.10000E+00 rad/s and at the point behind it" in said[0]
     assert "tried were every pair stuck" in said[0] and "ended at a residual of" in said[0]
     found = re.search(r"comes to a periodic motion \(amplitude (\S+)\) after \d+ periods", said[0])
     assert found and float(found[1]) == pytest.approx(amplitude, rel=SAME)
     assert "the harmonics of the balance can hold" in said[0]
+
+
+def test_a_fold_is_named(fw_run):
+    """Upwards over the resonance of a hardening spring, behind which no solution is near."""
+    said = explained(fw_run, "&case analysis = 'frf' /\n"
+                     "&model n_dof = 1, mass = 1.0, stiffness = 1.0, damping = 0.1 /\n"
+                     "&spring n_springs = 1, side_1 = 1, coefficient = 0.05, power = 3 /\n"
+                     "&load cosine = 1.0 /\n&harmonics n_harmonics = 5 /\n"
+                     "&sweep start = 0.5, end = 3.0, n_points = 251 /\n"
+                     "&solver max_iterations = 4, fallback = .false. /\n")
+    assert len(said) == 1 and "tried were the last solutions, every pair stuck" in said[0]
+    assert "as before a fold" in said[0] and "comes to a periodic motion" in said[0]
 
 
 def test_too_few_harmonics_are_named(fw_run):
