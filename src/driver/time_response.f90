@@ -94,7 +94,7 @@ contains
       type(point_type), intent(out) :: point
       type(motion_type), intent(out) :: motion
       !> Why there is none.
-      character(*), intent(out) :: refusal
+      character(480), intent(out) :: refusal
       !> A stop of the run.
       type(error_type), allocatable, intent(out) :: error
       type(time_strategy), allocatable, target :: integration
