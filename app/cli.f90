@@ -18,6 +18,8 @@ module fw_cli
       !> `group%key=value` each, in the order given.
       type(string_type), allocatable :: overrides(:)
       logical :: check = .false.
+      !> Say why points were not found.
+      logical :: explain = .false.
       !> Show the keys of the namelist, all or those of the group `input`, for a program or not.
       logical :: keys = .false., keys_as_json = .false.
       !> Show which keys do not go together.
@@ -206,6 +208,8 @@ contains
       select case (name)
       case ('--check')
          options%check = .true.
+      case ('--explain')
+         options%explain = .true.
       case ('--rules')
          options%rules = .true.
       case ('--parts')
@@ -230,16 +234,17 @@ contains
    pure logical function is_flag(name)
       character(*), intent(in) :: name
 
-      is_flag = any(name == [character(10) :: '--check', '--rules', '--parts', '--remarks', &
-                             '--messages', '--quiet', '--verbose', '--help', '--version'])
+      is_flag = any(name == [character(10) :: '--check', '--explain', '--rules', '--parts', &
+                             '--remarks', '--messages', '--quiet', '--verbose', '--help', &
+                             '--version'])
    end function is_flag
 
    function near(name) result(text)
       character(*), intent(in) :: name
       character(:), allocatable :: text
       character(*), parameter :: names(*) = [character(10) :: '--set', '--output', '--restart', &
-         '--keys', '--rules', '--parts', '--remarks', '--messages', '--check', '--quiet', &
-         '--verbose', '--help', '--version']
+         '--keys', '--rules', '--parts', '--remarks', '--messages', '--check', '--explain', &
+         '--quiet', '--verbose', '--help', '--version']
       type(string_type) :: options(size(names))
       integer :: i
 

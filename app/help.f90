@@ -23,6 +23,8 @@ contains
          '                         beside it)', &
          '  --restart FILE         go on with the wear run of this result file, also of one that', &
          '                         was killed (FILE.part)', &
+         '  --explain              say of points that were not found what was tried, what that', &
+         '                         met, and what an integration in time from there comes to', &
          '  --keys [GROUP]         what every key accepts and means, its unit and its default;', &
          '                         --keys=json for programs', &
          '  --rules                which keys do not go together, and what to use instead', &

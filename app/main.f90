@@ -2,9 +2,9 @@
 program fw_run_program
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use fw_blas, only: describe_blas, slow_kernel, text_length
-   use fw_case, only: case_type
+   use fw_case, only: analyses, analysis_words, case_type
    use fw_cli, only: cli_options, get_arguments, parse_arguments
-   use fw_error, only: error_type, status_ok
+   use fw_error, only: error_type, fatal_error, status_ok, status_usage
    use fw_help, only: write_help
    use fw_signals, only: catch_interrupts
    use fw_key_text, only: write_keys
@@ -110,11 +110,18 @@ contains
          end do
          return
       end if
+      if (options%explain .and. .not. is_explained(case)) then
+         call fatal_error(error, "--explain says why points of analysis = 'frf' or 'point' "// &
+                          "were not found, but this case has analysis = '"// &
+                          trim(analysis_words(case%analysis))//"'; leave --explain out", &
+                          status_usage)
+         return
+      end if
       progress = new_progress(options%quiet, options%verbose, &
                               in_hertz=case%sweep%unit == unit_hertz, &
                               parameter_swept=case%over%number)
       call catch_interrupts()
-      call run_case(case, progress, outcome, error)
+      call run_case(case, progress, outcome, error, explains=options%explain)
       if (allocated(error)) return
       status = outcome%status
       if (options%quiet .or. .not. allocated(outcome%summary)) return
@@ -123,6 +130,15 @@ contains
       end do
       call report_blas(options%verbose)
    end subroutine run
+
+   !> Whether points of a case are such that a run can say why they were not found.
+   pure logical function is_explained(case)
+      type(case_type), intent(in) :: case
+
+      associate (facts => analyses(case%analysis))
+         is_explained = facts%is_response .and. .not. facts%is_population
+      end associate
+   end function is_explained
 
    !> The BLAS where it is asked for, and its remedy where it is slow.
    subroutine report_blas(verbose)

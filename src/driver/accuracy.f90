@@ -84,6 +84,7 @@ module fw_accuracy
       procedure :: describe
       procedure :: remember
       procedure :: recall
+      procedure :: account
    end type accuracy_solver
 
 contains
@@ -559,6 +560,14 @@ contains
          memory%omega = solver%walk%known%place(1)
       end associate
    end subroutine remember
+
+   !> What was tried for the last point at the level in use.
+   function account(self) result(words)
+      class(accuracy_solver), intent(in) :: self
+      character(480) :: words
+
+      words = self%level(self%current, self%doublings)%solver%walk%account()
+   end function account
 
    !> Go on with that level: a solution fits no other.
    subroutine recall(self, memory)

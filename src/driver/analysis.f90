@@ -36,6 +36,8 @@ module fw_analysis
       type(restart_type) :: restart
       !> Of a piece of a sweep: what the one before left, and then what this one leaves.
       type(kept_strategy), pointer :: kept => null()
+      !> Whether it is to say why points were not found.
+      logical :: explains = .false.
       !> What is told in place of the summary.
       type(string_type), allocatable :: table(:)
    contains

@@ -8,9 +8,11 @@ module fw_frequency_response
    use fw_bifurcation_group, only: bifurcation_group
    use fw_case, only: analyses, case_type
    use fw_error, only: error_type
+   use fw_explanation, only: failure_list
    use fw_given_amplitude, only: given_amplitude
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
+   use fw_motion, only: motion_type
    use fw_one_level, only: one_level
    use fw_pair_cycle, only: pair_cycle
    use fw_peak, only: peak_type
@@ -25,7 +27,7 @@ module fw_frequency_response
    use fw_strategy, only: keeps_cycles, kept_strategy, point_request, point_strategy
    use fw_sweep, only: lead_places, list_source, point_source, sweep_places
    use fw_sweep_bifurcations, only: sweep_bifurcations
-   use fw_time_response, only: time_strategy
+   use fw_time_response, only: look_by_integration, time_strategy
    use fw_vibration_branch, only: vibration_branch
    use fw_walked_points, only: walked_points
    implicit none (type, external)
@@ -52,6 +54,8 @@ module fw_frequency_response
       type(peak_finder), private :: finder
       type(sweep_bifurcations), private :: changes
       type(cycle_keeper), private :: keeper
+      !> Points that were not found, where a run is to say why.
+      type(failure_list), private :: failures
    contains
       procedure :: start
       procedure :: conclude
@@ -78,6 +82,9 @@ contains
       type is (list_source)
          if (size(source%place) > 1) call watch(self, case, source, run)
       end select
+      if (.not. run%explains) return
+      self%failures%strategy => self%strategy
+      call run%sinks%add(self%failures)
    end subroutine start
 
    !> Searches between the points come after the last: what they need of the rows is kept.
@@ -122,6 +129,10 @@ contains
       end associate
       ! Rows that are still to come count with the others.
       if (.not. case%sweep%refine) call describe(case, self%strategy, run)
+      if (run%explains .and. .not. run%state%was_stopped) then
+         call explain(self%failures, case, run, error)
+         if (allocated(error)) return
+      end if
       ! A run that was stopped is not made longer by a search.
       if (.not. run%state%was_stopped) call search(self, case, run, error)
       if (case%sweep%refine .and. .not. allocated(error)) call describe(case, self%strategy, run)
@@ -137,6 +148,29 @@ contains
       end select
       call move_alloc(self%strategy, run%kept%strategy)
    end subroutine conclude
+
+   !> Say why points were not found.
+   subroutine explain(failures, case, run, error)
+      type(failure_list), intent(in) :: failures
+      type(case_type), intent(in) :: case
+      type(run_type), intent(inout), target :: run
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: point
+      type(motion_type) :: motion
+      character(480) :: refusal
+      character(:), allocatable :: text
+      integer :: k
+
+      do k = 1, failures%n_places()
+         call look_by_integration(case, failures%omega(k), run%observer, point, motion, refusal, &
+                                  error)
+         ! A stop leaves the rest unsaid, and the rows are whole.
+         if (allocated(error)) call run%forgive_stop(error)
+         if (allocated(error) .or. run%state%was_stopped) return
+         call failures%tell(k, case%harmonics%n_harmonics, point, motion, refusal, text)
+         call run%tell('explained', text)
+      end do
+   end subroutine explain
 
    !> What lies between the rows; a stop leaves it out, and the rows are whole.
    subroutine search(self, case, run, error)

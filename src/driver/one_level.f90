@@ -38,6 +38,7 @@ module fw_one_level
       procedure :: remember
       procedure :: recall
       procedure :: start_anew
+      procedure :: account
       procedure :: begin_run
       final :: forget
    end type one_level
@@ -177,6 +178,14 @@ contains
 
       call self%level%solver%walk%known%begin_with(memory%omega, memory%x)
    end subroutine recall
+
+   !> What was tried for the last point; other balances of the case are gone to behind its own.
+   function account(self) result(words)
+      class(one_level), intent(in) :: self
+      character(480) :: words
+
+      words = self%level%solver%walk%account()
+   end function account
 
    !> Neither solutions nor failures are known.
    subroutine start_anew(self)

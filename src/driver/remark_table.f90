@@ -182,6 +182,10 @@ module fw_remark_table
       remark_kind('several solutions', &
                   'pieces of a sweep (fretwear run --workers) came to different solutions '// &
                   'of the same points: those of a sweep from the start were taken'), &
+      remark_kind('explained', &
+                  'fw_run --explain: what was tried for points that were not found, what '// &
+                  'that met, and what an integration in time comes to from there (the first '// &
+                  'of at most three places where points begin to fail)'), &
       remark_kind('branch condensed', &
                   'a small structure could not be taken whole where its branch begins: '// &
                   'resonances that the unknowns of the joint do not show may be stepped '// &
@@ -212,7 +216,7 @@ module fw_remark_table
          'point 12 of 41: ..., NOT CONVERGED', &
          'more points in the sweep; sweep in the other direction; more n_time '// &
          '(where events are located it changes little); penalty_scale 0.3 or 3; '// &
-         'start away from the peak. Exit status 4'), &
+         'start away from the peak; fw_run --explain says why. Exit status 4'), &
       message_kind( &
          'accuracy 1.00E-03 is missed at 7 points, ...', &
          'the answer is there, but the bound of its error is larger, at the '// &

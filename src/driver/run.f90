@@ -85,7 +85,7 @@ contains
    !> Run a case and write its result file. Points that did not converge make the outcome
    !> status_not_converged, an observer that asks for it status_stopped; `error` is for what ends
    !> the run.
-   subroutine run_case(case, observer, outcome, error, write_file, image, kept)
+   subroutine run_case(case, observer, outcome, error, write_file, image, kept, explains)
       type(case_type), intent(in), target :: case
       class(observer_type), intent(inout), target :: observer
       type(outcome_type), intent(out) :: outcome
@@ -97,6 +97,8 @@ contains
       integer(c_int8_t), allocatable, intent(out), optional :: image(:)
       !> Of a piece of a sweep: what the one before left, and then what this one leaves.
       type(kept_strategy), intent(inout), target, optional :: kept
+      !> Say why points were not found (default: no).
+      logical, intent(in), optional :: explains
       type(run_type), target :: run
       class(analysis), allocatable, target :: work
       type(thread_scope) :: threads
@@ -110,6 +112,7 @@ contains
                                                 in_memory=present(image))
       if (allocated(error)) return
       if (present(kept)) run%kept => kept
+      if (present(explains)) run%explains = explains
       ! Behind the file, before the first product: results must not depend on the threads of the
       ! host.
       call threads%enter(threads_for(case))

@@ -73,6 +73,7 @@ module fw_strategy
       procedure :: remember => remember_nothing
       procedure :: recall => recall_nothing
       procedure :: start_anew => keep_all
+      procedure :: account => nothing_to_tell
    end type point_strategy
 
    !> What one run leaves for the next one over the same sweep.
@@ -169,6 +170,16 @@ contains
       associate (unused => self)
       end associate
    end subroutine keep_all
+
+   !> What was tried for the last point where it was not found; '' of a strategy that does not tell.
+   function nothing_to_tell(self) result(words)
+      class(point_strategy), intent(in) :: self
+      character(480) :: words
+
+      associate (unused => self)
+      end associate
+      words = ''
+   end function nothing_to_tell
 
    !> Solve within the time that the case gives a point. A stop is an error of status_stopped.
    subroutine solve_in_time(self, case, request, point, error)

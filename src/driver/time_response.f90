@@ -7,11 +7,14 @@
 module fw_time_response
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
+   use fw_motion, only: motion_type
    use fw_case, only: analysis_frf, analysis_time, case_type
+   use fw_combinations, only: check_combinations
    use fw_cycle_recovery, only: cycle_of_histories
-   use fw_error, only: error_type, fatal_error, status_input
+   use fw_error, only: error_type, fatal_error, status_input, status_stopped
    use fw_guess, only: stuck_guess
    use fw_harmonics_options, only: method_hbm
+   use fw_interrupt, only: interrupt_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_point, only: point_type
@@ -19,6 +22,9 @@ module fw_time_response
    use fw_problem, only: build_system
    use fw_recovery, only: recover_point
    use fw_run_state, only: run_state
+   use fw_sensitivity_options, only: sensitivity_options
+   use fw_solver_options, only: continuation_natural
+   use fw_stress_options, only: stress_options
    use fw_strategy, only: new_request, point_request, point_strategy
    use fw_summary, only: summary_type
    use fw_text, only: to_text
@@ -27,11 +33,14 @@ module fw_time_response
    implicit none (type, external)
    private
 
-   public :: time_strategy
+   public :: look_by_integration, time_strategy
 
    !> Tightest relative change from period to period that is asked for: changes of state that move
    !> by one of the smallest steps keep it from vanishing.
    real(wp), parameter :: tightest_change = 1.0e-8_wp
+   !> Where a balance fails, harmonics that are looked at over those of the balance, and instants
+   !> for each of them.
+   integer, parameter :: times = 4, instants = 4
 
    type, extends(point_strategy) :: time_strategy
       !> The case of which the harmonic balance gives the initial states, and its system.
@@ -41,6 +50,8 @@ module fw_time_response
       class(point_solver), allocatable :: solver
       !> What is integrated.
       type(time_structure) :: structure
+      !> What the last motion does from there on; allocated where that is wanted.
+      type(motion_type), allocatable :: motion
    contains
       procedure :: start
       procedure :: solve
@@ -73,6 +84,72 @@ contains
          end if
       end associate
    end subroutine start
+
+   !> Where a balance of a case has no solution: what an integration comes to at that frequency.
+   subroutine look_by_integration(case, omega, interrupt, point, motion, refusal, error)
+      type(case_type), intent(in) :: case
+      !> [rad/s]
+      real(wp), intent(in) :: omega
+      class(interrupt_type), intent(inout), target :: interrupt
+      type(point_type), intent(out) :: point
+      type(motion_type), intent(out) :: motion
+      !> Why there is none.
+      character(480), intent(out) :: refusal
+      !> A stop of the run.
+      type(error_type), allocatable, intent(out) :: error
+      type(time_strategy), allocatable, target :: integration
+      type(case_type), allocatable :: timed
+
+      refusal = ''
+      if (case%over%is_wanted() .or. case%control%is_wanted()) then
+         refusal = 'is not offered along a parameter or for amplitudes that are given'
+         return
+      end if
+      allocate (timed, source=case)
+      call make_timed(omega, timed)
+      call check_combinations(timed, error)
+      if (.not. allocated(error)) then
+         allocate (integration)
+         allocate (integration%motion)
+         call integration%start(timed, error)
+      end if
+      if (allocated(error)) then
+         refusal = 'is not offered: '//error%message
+         deallocate (error)
+         return
+      end if
+      ! Of the motion all that a finer balance would have.
+      timed%harmonics%n_harmonics = times*case%harmonics%n_harmonics
+      call integration%solve(timed, point_request(omega=omega, fallback=.false., &
+                                                  interrupt=interrupt), point, error)
+      motion = integration%motion
+      if (.not. allocated(error)) return
+      if (error%status == status_stopped) return
+      refusal = 'failed: '//error%message
+      deallocate (error)
+   end subroutine look_by_integration
+
+   !> The case as one of an integration, from a state that costs little.
+   subroutine make_timed(omega, timed)
+      real(wp), intent(in) :: omega
+      type(case_type), intent(inout) :: timed
+
+      timed%analysis = analysis_time
+      timed%sweep%start = omega
+      timed%sweep%end = 0.0_wp
+      timed%sweep%n_points = 1
+      if (allocated(timed%sweep%frequencies)) deallocate (timed%sweep%frequencies)
+      timed%sweep%stability = .false.
+      timed%sweep%refine = .false.
+      timed%sweep%continuation = continuation_natural
+      timed%solver%fallback = .false.
+      timed%sensitivity = sensitivity_options()
+      timed%stress = stress_options()
+      timed%time%steps_per_period = max(timed%time%steps_per_period, &
+                                        instants*times*timed%harmonics%n_harmonics)
+      timed%harmonics%accuracy = 0.0_wp
+      timed%harmonics%n_harmonics = max(1, timed%model%waves%highest())
+   end subroutine make_timed
 
    !> Nothing that the summary shows.
    subroutine describe(self, case, state, summary, message)
@@ -140,7 +217,8 @@ contains
       if (allocated(error)) return
       call integrate_in_time(self%structure, case%model%observe_matrix, request%omega, case%time, &
                              max(case%solver%tolerance, tightest_change), state, &
-                             case%harmonics%n_harmonics, point, error, request%interrupt)
+                             case%harmonics%n_harmonics, point, error, request%interrupt, &
+                             self%motion)
       if (allocated(error)) return
       ! The integration leaves all; the request says what of it a row has.
       if (request%cycle) call cycle_of_histories(point)

@@ -93,6 +93,8 @@ module fw_vibration
       !> smaller steps, LU and the free guess came to no other one (0 of 180 such points of dlft on
       !> masses), and other balances neither where the solver had found it (0 of 140).
       logical :: found_ripple = .false., ripples = .false.
+      !> Ways behind the guesses that were gone to the present point.
+      character(160) :: tried = ''
       !> What gave the present solution, the guess that did, and whether it was the first.
       integer :: served_by = served_by_none, guess = 0
       logical :: was_first = .false.
@@ -112,6 +114,7 @@ module fw_vibration
       procedure :: is_new
       procedure :: note_attempt
       procedure :: note_best
+      procedure :: account
    end type walk_type
 
    type, abstract :: vibration
@@ -215,6 +218,57 @@ contains
       is_same = .true.
    end function is_same
 
+   !> What was tried for a point that was not found, and what that met.
+   function account(self) result(words)
+      class(walk_type), intent(in) :: self
+      character(480) :: words
+
+      words = 'tried were every pair stuck'
+      if (self%known%kept > 0) words = 'tried were the last solutions, every pair stuck'
+      words = trim(words)//self%tried
+      if (self%best_residual < huge(1.0_wp)) then
+         words = trim(words)//'; the best ended at a residual of '//shown(self%best_residual)
+      end if
+      if (self%found_ripple .or. self%ripples) then
+         words = trim(words)//'; what solved the equations had friction that is ripple'
+      end if
+      if (self%out_of_work) words = trim(words)//'; the iterations that a point is worth were spent'
+      if (self%known%kept == 0) return
+      if (abs(self%known%place(1) - self%wanted%along) > 0.0_wp) then
+         words = trim(words)//'; the last solution is at '//shown(self%known%place(1))
+         if (turns(self%known)) words = trim(words)//', where the curve grows steeper, as '// &
+                                        'before a fold: continuation = ''arclength'' follows one'
+      end if
+   end function account
+
+   !> Whether the last solutions change ever faster, by their distances over those of their places.
+   pure logical function turns(known)
+      type(solution_history), intent(in) :: known
+      !> The last two slopes over each other: those of a root whose end is within the next step are
+      !> 1.3 to 2.4.
+      real(wp), parameter :: steeper = 1.3_wp
+      real(wp) :: slope(2), step
+      integer :: k
+
+      turns = .false.
+      if (known%kept < 3) return
+      do k = 1, 2
+         step = abs(known%place(k) - known%place(k + 1))
+         if (.not. step > 0.0_wp) return
+         slope(k) = norm2(known%x(:, k) - known%x(:, k + 1))/step
+      end do
+      turns = slope(1) > steeper*slope(2)
+   end function turns
+
+   !> A number to read, of six digits.
+   function shown(number) result(words)
+      real(wp), intent(in) :: number
+      character(24) :: words
+
+      write (words, '(es12.5)') number
+      words = adjustl(words)
+   end function shown
+
    !> Whether a way of its table can be gone now.
    logical function offers(self, way)
       class(vibration), intent(in) :: self
@@ -254,6 +308,7 @@ contains
       self%out_of_work = .false.
       self%found_ripple = .false.
       self%ripples = .false.
+      self%tried = ''
       self%spent_last = 0
       v%iterations = 0
       self%most_allowed = most_work
@@ -283,6 +338,9 @@ contains
          found = report
          call try(self, v, self%ways(k), at, x, found, error)
          if (allocated(error)) return
+         if (index(self%tried, trim(self%ways(k)%word)) == 0) then
+            self%tried = trim(self%tried)//', '//trim(self%ways(k)%word)
+         end if
          if (self%ways(k)%is_last) self%spent_last = self%spent_last + v%iterations - before
          report = found
          if (report%converged .and. self%ways(k)%served_by /= served_by_none) then

@@ -3,10 +3,11 @@
 module fw_time_solution
    use fw_interrupt, only: interrupt_type, stop_run
    use fw_kinds, only: wp
-   use fw_error, only: error_type, fatal_error, status_failure
+   use fw_error, only: error_type, fatal_error, status_failure, status_input
+   use fw_motion, only: follow_motion, motion_type
    use fw_period_record, only: averaged_coefficients, largest_sample, period_record, &
       sampled_coefficients
-   use fw_periodic_state, only: find_periodic_state, periodic_report
+   use fw_periodic_state, only: find_periodic_state, period_map, periodic_report
    use fw_point, only: point_type
    use fw_smooth_integration, only: is_smooth, new_smooth_integration, smooth_integration
    use fw_time_options, only: time_options
@@ -31,7 +32,7 @@ contains
    !> contact forces, shares and work; `iterations` are the periods, `residual` the change from
    !> one period to the next.
    subroutine integrate_in_time(structure, observe, omega, options, tolerance, state, n_harmonics, &
-                                point, error, interrupt)
+                                point, error, interrupt, motion)
       type(time_structure), intent(in) :: structure
       !> Observed quantities (n_observed, n_dof).
       real(wp), intent(in) :: observe(:, :)
@@ -46,6 +47,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> What may end it early (default: nothing); a stop of the run is an error of status_stopped.
       class(interrupt_type), pointer, intent(in), optional :: interrupt
+      !> What the motion from there does: then it is followed as it is before a search.
+      type(motion_type), intent(out), optional :: motion
       type(periodic_report) :: report
       type(smooth_integration) :: smooth
       type(time_stepper) :: stepper
@@ -57,7 +60,7 @@ contains
          call new_smooth_integration(structure, observe, omega, options%steps_per_period, smooth)
          if (present(interrupt)) smooth%interrupt => interrupt
          vector = [state%displacement, state%velocity]
-         call find_periodic_state(smooth, options%n_periods, tolerance, vector, report)
+         call find_motion(smooth, options%n_periods, tolerance, vector, report, motion)
          call stop_run(smooth%interrupt, error)
          if (.not. allocated(error) .and. smooth%complaint /= '') then
             call fatal_error(error, 'integration in time: '//trim(smooth%complaint), status_failure)
@@ -72,7 +75,7 @@ contains
          if (present(interrupt)) stepper%interrupt => interrupt
          vector = stepper%pack_state(state%displacement, state%velocity, &
                                      row_memory(structure, state%corrected))
-         call find_periodic_state(stepper, options%n_periods, tolerance, vector, report)
+         call find_motion(stepper, options%n_periods, tolerance, vector, report, motion)
          call stop_run(stepper%interrupt, error)
          if (.not. allocated(error) .and. stepper%complaint /= '') then
             call fatal_error(error, 'integration in time: '//trim(stepper%complaint), &
@@ -89,6 +92,22 @@ contains
       point%residual = report%change
       point%converged = report%converged
    end subroutine integrate_in_time
+
+   !> The periodic state, or what a motion comes to where that is asked for.
+   subroutine find_motion(map, n_periods, tolerance, state, report, motion)
+      class(period_map), intent(inout) :: map
+      integer, intent(in) :: n_periods
+      real(wp), intent(in) :: tolerance
+      real(wp), intent(inout), contiguous :: state(:)
+      type(periodic_report), intent(out) :: report
+      type(motion_type), intent(out), optional :: motion
+
+      if (present(motion)) then
+         call follow_motion(map, n_periods, tolerance, state, report, motion)
+      else
+         call find_periodic_state(map, n_periods, tolerance, state, report)
+      end if
+   end subroutine find_motion
 
    !> Corrected positions by rows (n_rows).
    pure function row_memory(structure, corrected) result(memory)

@@ -26,7 +26,7 @@ __all__ = ["known_rows"]
 #: Keys that change no row.
 _FREE = ("case%title", "case%threads", "case%max_seconds", "output%file")
 #: Rows on either side of a maximum that are solved again; fewer between two such are not worth it.
-_AROUND, _BETWEEN = 2, 6
+_AROUND, _BETWEEN = 1, 6
 #: Rows of a file are those of the sweep within this, relative.
 _SAME_PLACE = 1e-12
 
@@ -112,8 +112,9 @@ def _count(file: h5py.File, places: NDArray[np.float64]) -> int:
 
 def _marks(file: h5py.File, n_rows: int) -> Ints:
     """Rows between which a run looks for something at its end, counted from 1."""
-    marked = {1}   # a maximum at the start
     amplitude = file["amplitude"][:n_rows]
+    # Where nothing rises from the start, a maximum may be there, of a row that failed too.
+    marked = set() if len(amplitude) > 1 and (amplitude[0] < amplitude[1]).all() else {1}
     if len(amplitude) > 2:
         inner = amplitude[1:-1]
         is_top = (inner >= amplitude[:-2]) & (inner >= amplitude[2:])
