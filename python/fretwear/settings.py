@@ -12,10 +12,10 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic", "Damper",
-           "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output", "Polynomial",
-           "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Stress",
-           "Structure", "Sweep", "Time", "User", "Wear"]
+__all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic",
+           "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output",
+           "Polynomial", "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring",
+           "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -178,6 +178,12 @@ class Structure(TypedDict, total=False):
     stiffness_unsymmetric: ArrayLike
     #: [F s/L] added to the damping as it is (default: 0)
     damping_unsymmetric: ArrayLike
+    #: displacements that are combinations of dofs: sides, term_dof and observe name them by n_dof +
+    #: 1, .. (default: of the file, else 0)
+    n_rows: int
+    #: weight of each dof in each of them, row after row (default: of the file, else required with
+    #: n_rows)
+    row: ArrayLike
     #: [1/s] adds this times M to the damping (default: 0)
     rayleigh_mass: float
     #: [s] adds this times K, with rotation, to the damping (default: 0)
@@ -474,7 +480,7 @@ class Load(TypedDict, total=False):
     sine: ArrayLike
     #: loads on single dofs in any harmonic, added to the others (default: 0)
     n_terms: int
-    #: dof; negative: with its sign turned (required with n_terms)
+    #: dof, or n_dof and a row; negative: with its sign turned (required with n_terms)
     term_dof: ArrayLike
     #: harmonic, 0 to n_harmonics (default: 1, or by term_order)
     term_harmonic: ArrayLike
@@ -787,8 +793,8 @@ class Output(TypedDict, total=False):
     #: highest harmonic of the answer that is given back, above those of the balance; 0: theirs;
     #: only: law = 'rigid' (default: 0)
     tail: int
-    #: which displacements are written; a dof number k is called uk (default: all that the model
-    #: file names, else every dof)
+    #: which displacements are written; a dof number k is called uk, n_dof + k rowk (default: all
+    #: that the model file names, else every dof)
     observe: str | int | Sequence[str | int]
 
 

@@ -15,6 +15,7 @@ module fw_remarks
    use fw_modes, only: mode_type
    use fw_result_group, only: group_writer, result_group
    use fw_sector_modes, only: find_sector_modes
+   use fw_side, only: terms_of
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_undetermined, only: undetermined_note
@@ -266,7 +267,7 @@ contains
       type(remark_list), intent(inout) :: remarks
       type(law_facts) :: facts
       logical :: impacts
-      integer :: i, dof(2)
+      integer :: i
 
       associate (contact => case%contact)
          if (contact%n_pairs == 0) return
@@ -279,8 +280,8 @@ contains
          end if
          impacts = .false.
          do i = 1, contact%n_pairs
-            dof = abs([contact%side_1(3, i), contact%side_2(3, i)])
-            impacts = impacts .or. has_mass(case, dof(1)) .or. has_mass(case, dof(2))
+            impacts = impacts .or. has_mass(case, contact%side_1(3, i)) .or. &
+                      has_mass(case, contact%side_2(3, i))
          end do
          if (impacts) call remarks%add('impact on mass', 'a normal dof has mass: where it '// &
             'lifts off and lands, errors fall with 1/H only, as impacts of masses have a tail '// &
@@ -288,13 +289,16 @@ contains
       end associate
    end subroutine remark_tail
 
-   !> The ground, dof 0, has none.
-   pure logical function has_mass(case, dof)
+   !> Whether a side has any; the ground has none.
+   pure logical function has_mass(case, side)
       type(case_type), intent(in) :: case
-      integer, intent(in) :: dof
+      integer, intent(in) :: side
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
+      integer :: i
 
-      has_mass = .false.
-      if (dof > 0) has_mass = case%model%mass(dof, dof) > 0.0_wp
+      call terms_of(side, dof, weight, case%model%rows)
+      has_mass = any([(case%model%mass(dof(i), dof(i)) > 0.0_wp, i=1, size(dof))])
    end function has_mass
 
    !> A model that was reduced up to a frequency says nothing above it; modal damping of large

@@ -34,6 +34,9 @@ module fw_model
       !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
       real(wp), allocatable :: observe_matrix(:, :)
       type(string_type), allocatable :: observe_name(:)
+      !> Displacements that are combinations of dofs, which sides may name by numbers beyond n_dof
+      !> (n_dof, n_rows); not allocated where there are none.
+      real(wp), allocatable :: rows(:, :)
       !> Sectors around an axis, of which the matrices are one.
       type(cyclic_type) :: cyclic
       !> Names of the units, 'length-mass-time-force', for labels; not allocated if not known.
