@@ -18,6 +18,8 @@ from ._namelist import literal
 from ._native import Session, unread_parts
 from .elements import Elements, checked_elements, read_elements
 from .errors import InputError, NotBuiltError, OutputError
+from .loose_bodies import OF_PICTURES as PICTURES_OF_BODIES
+from .loose_bodies import Bodies, read_bodies
 from .mistuning import Mistuning, read_mistuning
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
@@ -232,6 +234,8 @@ class Model:
     rows : (n_rows, n_dof), optional
         Displacements that are combinations of dofs: sides, `observe` and elements name them by the
         numbers n_dof + 1, n_dof + 2, ..
+    bodies : Bodies, optional
+        Bodies that no spring holds; `fretwear.damper` makes them.
     reduction : pair of floats, optional
         Up to which frequency [Hz] the model was reduced to an accuracy, and the estimated error of
         the stiffness of the joint there; runs beyond it are remarked on.
@@ -266,7 +270,7 @@ class Model:
                  mistuning: Mistuning | None = None,
                  speeds: Mapping[float, Any] | None = None,
                  reduction: tuple[float, float] | None = None,
-                 rows: ArrayLike | None = None,
+                 rows: ArrayLike | None = None, bodies: Bodies | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
@@ -319,6 +323,9 @@ class Model:
             if not isinstance(law, Law):
                 raise InputError(f"laws[{number}]: is a {type(law).__name__}, must be a Law")
         self.laws = tuple(law.checked(number, sides) for number, law in enumerate(laws))
+        if bodies is not None and not isinstance(bodies, Bodies):
+            raise InputError(f"bodies: is a {type(bodies).__name__}, must be Bodies")
+        self.bodies = None if bodies is None else bodies.checked(n)
         self.sectors = None if sectors is None else sectors.checked(n)
         if stress is not None and not isinstance(stress, Stress):
             raise InputError(f"stress: is a {type(stress).__name__}, must be Stress")
@@ -505,6 +512,7 @@ class Model:
                     load_table=found.get("load/table"), stress=read_stress(file),
                     mistuning=read_mistuning(file), speeds=read_speeds(file),
                     reduction=_reduction_of(file), rows=found.get("row/matrix"),
+                    bodies=read_bodies(file),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -594,6 +602,8 @@ class Model:
             found.update(self.stress.datasets())
         if self.mistuning is not None:
             found.update(self.mistuning.datasets())
+        if self.bodies is not None:
+            found.update(self.bodies.datasets())
         if self._observe is not None:
             found["observe/name"] = strings(self._observe[0])
             found["observe/matrix"] = self._observe[1]
@@ -612,7 +622,7 @@ class Model:
         if self.sectors is not None:
             session.put("cyclic/n_sectors", np.array([self.sectors.n_sectors], dtype=np.int32))
         for name, values in self._datasets().items():
-            if name.removeprefix("stress/") in OF_PICTURES:
+            if name.removeprefix("stress/") in OF_PICTURES or name in PICTURES_OF_BODIES:
                 continue
             if not name.startswith("observe/") and values.dtype.kind in "if":
                 session.put(name, values)
@@ -624,6 +634,8 @@ class Model:
                 session.put_texts(f"{group}/kind", [kind])
         for law in self.laws:
             session.add_law(law)
+        if self.bodies is not None:
+            session.put_texts("body/name", list(self.bodies.name))
         for name in ("title", "unit_system"):
             if getattr(self, name):
                 session.put_texts(name, [getattr(self, name)])

@@ -12,7 +12,7 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic",
+__all__ = ["UNITS", "Base", "Body", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic",
            "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output",
            "Polynomial", "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring",
            "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
@@ -32,6 +32,7 @@ UNITS: dict[str, str] = {
     "model%rayleigh_stiffness": "s",
     "model%modal_damping_up_to": "Hz",
     "model%rotation_speed": "rad/s",
+    "body%mass": "M",
     "mistuning%rows": "M^0.5",
     "mistuning%row_omega": "rad/s",
     "mistuning%blade_stiffness": "F/L",
@@ -130,7 +131,7 @@ class Resonance(_Resonance, total=False):
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
                        "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
                        "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
-                       "mistuning%scale"]
+                       "mistuning%scale", "body%mass"]
     #: first value, or factor; only: analysis = 'resonance' (required, else 0)
     start: float
     #: last value, or factor; only: analysis = 'resonance' (required, else 0)
@@ -199,6 +200,13 @@ class Structure(TypedDict, total=False):
     #: adds i times this part of the stiffness, with rotation, in harmonics above 0: hysteretic
     #: damping (default: 0)
     loss_factor: float
+
+
+class Body(TypedDict, total=False):
+    """Group &body: bodies of the model that no spring holds."""
+
+    #: [M] of each body of the model, in place of its own (default: of the file)
+    mass: ArrayLike
 
 
 class Cyclic(TypedDict, total=False):
@@ -577,7 +585,7 @@ class Sweep(_Sweep, total=False):
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
                        "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
                        "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
-                       "mistuning%scale"]
+                       "mistuning%scale", "body%mass"]
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)
@@ -819,6 +827,7 @@ class Groups(TypedDict, total=False):
     sensitivity: Sensitivity
     resonance: Resonance
     structure: Structure
+    body: Body
     cyclic: Cyclic
     population: Population
     mistuning: Mistuning

@@ -8,6 +8,7 @@ module fw_raw_model
    use fw_kinds, only: wp
    use fw_law_text, only: all_laws
    use fw_laws, only: law_words
+   use fw_loose_bodies, only: loose_bodies
    use fw_mistuning_parts, only: mistuning_parts
    use fw_speed_growth, only: speed_growth
    use fw_speed_parts, only: speed_parts
@@ -67,6 +68,8 @@ module fw_raw_model
       type(stress_parts) :: stress
       !> How sectors differ from the tuned one.
       type(mistuning_parts), allocatable :: mistuning
+      !> Bodies that no spring holds.
+      type(loose_bodies), allocatable :: bodies
       !> Hysteretic damping, symmetric (n_dof, n_dof) [force/length].
       real(wp), allocatable :: structural_damping(:, :)
       !> Of any shape (n_dof, n_dof): stiffness per rotation speed, stiffness and damping.
@@ -113,6 +116,8 @@ contains
       call self%cyclic%bind_parts(to)
       if (.not. allocated(self%mistuning)) allocate (self%mistuning)
       call self%mistuning%bind_parts(self%cyclic%n_sectors, to)
+      if (.not. allocated(self%bodies)) allocate (self%bodies)
+      call self%bodies%bind_parts(to)
       call self%stress%bind_parts(to)
       call note_mesh(to)
    end subroutine bind_parts

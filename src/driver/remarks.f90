@@ -7,6 +7,7 @@ module fw_remarks
    use fw_joint_modes, only: held_stiffness, joint_mode_type, most_dofs, state_sliding
    use fw_kinds, only: pi, wp
    use fw_lapack, only: dpotrf
+   use fw_held_bodies, only: body_hold, find_hold
    use fw_harmonics_options, only: method_hbm, sampling_uniform
    use fw_law_text, only: law_text
    use fw_laws, only: facts_of, law_under_accuracy, law_words, is_of_high_order
@@ -108,7 +109,38 @@ contains
       call remark_harmonics(case, remarks)
       call remark_law(case, remarks)
       call remark_tail(case, remarks)
+      call remark_bodies(case, remarks)
    end subroutine remark_input
+
+   !> Bodies that forces without a load can hold, or that normals leave a motion.
+   subroutine remark_bodies(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      type(body_hold) :: hold
+      type(string_type), allocatable :: numbers(:)
+      integer :: i, k
+
+      if (.not. allocated(case%bodies)) return
+      do i = 1, case%bodies%count()
+         call find_hold(case, i, hold)
+         if (hold%has_springs) cycle
+         associate (name => case%bodies%name(i)%text)
+            if (hold%locks_itself) call remarks%add('self-locking', 'body '//name//' can be '// &
+               'jammed: friction holds forces of its pairs without a load, and its normal '// &
+               'forces at rest have no upper bound')
+            if (hold%n_by_normals == hold%n_motions) cycle
+            allocate (numbers(0))
+            do k = 1, size(hold%touches)
+               if (hold%touches(k)) call append(numbers, to_text(k))
+            end do
+            call remarks%add('body turns', 'the normals of body '//name//' (pairs '// &
+               trim(list_of(numbers))//') hold '//to_text(hold%n_by_normals)//' of its '// &
+               to_text(hold%n_motions)//' motions: friction alone holds the others, and '// &
+               'nothing where all its pairs slip')
+            deallocate (numbers)
+         end associate
+      end do
+   end subroutine remark_bodies
 
    !> A load at rest that a wave meets has the order that the speed has to the frequency.
    subroutine remark_order(case, remarks)

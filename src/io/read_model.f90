@@ -80,11 +80,35 @@ contains
                             "'hdf5' or 'matrix_market', or remove file")
       end if
       call take_unit_system(reader, options, raw)
+      if (.not. allocated(raw%bodies)) allocate (raw%bodies)
       call read_matrices(reader, is_inline, n_dof, raw, needed=is_inline .and. &
                          .not. allocated(options%file))
       call read_rows(reader, n_dof, raw)
       call options%bind_additions(reader)
+      call read_bodies(reader, n_dof, raw)
    end subroutine read_model
+
+   !> Bodies that no spring holds join the mass and the load of the rotation.
+   subroutine read_bodies(reader, n_dof, raw)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_dof
+      type(raw_model), intent(inout) :: raw
+      character(100) :: fault
+
+      if (raw%bodies%count() == 0 .and. reader%given('body', 'mass')) then
+         call reader%refuse('body', 'mass', 'is given, but the model has no bodies (/body): '// &
+                            'remove it, or make the model with fretwear.damper')
+      end if
+      call raw%bodies%bind_keys(reader)
+      if (reader%failed() .or. raw%bodies%count() == 0) return
+      call raw%bodies%find_fault(n_dof, fault)
+      if (len_trim(fault) > 0) then
+         call reader%refuse_model(trim(fault))
+         return
+      end if
+      ! Matrices of nodal diameters take them one by one.
+      if (allocated(raw%mass)) call raw%bodies%join(n_dof, raw%mass, raw%growth%load)
+   end subroutine read_bodies
 
    !> Displacements that are combinations of dofs, on top of those of a file.
    subroutine read_rows(reader, n_dof, raw)

@@ -15,8 +15,9 @@ module fw_model
    type :: matrix_change
       !> Which parameter.
       integer :: parameter = 0
-      !> Of stiffness and damping (n_dof, n_dof), and of the static load (n_dof).
-      real(wp), allocatable :: stiffness(:, :), damping(:, :), load_static(:)
+      !> Of stiffness, damping and mass (n_dof, n_dof), and of the static load (n_dof); that of the
+      !> mass is not allocated where the parameter changes none.
+      real(wp), allocatable :: stiffness(:, :), damping(:, :), mass(:, :), load_static(:)
       !> The parameter in the case.
       real(wp) :: value = 0.0_wp
       !> Whether the change of the stiffness is one of hysteretic damping, i times it above harmonic

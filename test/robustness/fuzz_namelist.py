@@ -14,6 +14,7 @@ KEYS = {
               "structural_damping", "circulatory", "stiffness_unsymmetric", "damping_unsymmetric",
               "n_rows", "row", "rayleigh_mass", "rayleigh_stiffness", "modal_damping",
               "modal_damping_up_to", "rotation_speed", "loss_factor"],
+    "body": ["mass"],
     "cyclic": ["n_sectors", "engine_order", "mistuned", "n_modes", "n_interface", "left", "right"],
     "mistuning": ["n_rows", "rows", "row_omega", "frequency", "damping_ratio", "stiffness", "mass",
                   "blade_stiffness", "blade_mass", "scale"],

@@ -12,6 +12,7 @@ from .campaigns import plot_campbell, plot_damping, plot_force, read_damping
 from .command import add_arguments, main
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
+from .dampers import plot_damper
 from .disks import plot_nodal_diameters, plot_safe, plot_wave
 from .flanks import plot_flanks
 from .found import plot_calibration, plot_optimum
@@ -34,7 +35,8 @@ from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
            "half_power_damping", "main", "plot_backbone", "plot_blades", "plot_calibration",
-           "plot_campbell", "plot_content", "plot_convergence", "plot_cycle", "plot_damping",
+           "plot_campbell", "plot_content", "plot_convergence", "plot_cycle", "plot_damper",
+           "plot_damping",
            "plot_envelope", "plot_flanks", "plot_force", "plot_harmonics",
            "plot_hysteresis", "plot_mission", "plot_mode", "plot_nodal_diameters", "plot_optimum",
            "plot_population",
