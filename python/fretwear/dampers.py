@@ -286,9 +286,10 @@ def _joined(model: Model, body: _Body, points: list[_Point], radius: float,
             side_2[i, c] = rows.number(platform[c])
     _add_matrices(parts, stiffness, body, first, n)
     parts["rows"] = rows.matrix()
-    pairs = ContactPairs(side_1, side_2, sector_2=[point.sector for point in points], **{
+    given: dict[str, Any] = {
         key: np.broadcast_to(np.asarray(value, dtype=float), (len(points),))
-        for key, value in constants.items() if value is not None})
+        for key, value in constants.items() if value is not None}
+    pairs = ContactPairs(side_1, side_2, sector_2=[point.sector for point in points], **given)
     n_before = model.n_pairs
     parts["contact"] = _more_pairs(parts["contact"], pairs, law)
     if body.matrices is None:

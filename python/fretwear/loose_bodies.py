@@ -91,9 +91,10 @@ class Bodies:
         def both(key: str, shift: int = 0) -> Any:
             first, second = getattr(self, key), getattr(other, key)
             return np.concatenate([first, np.asarray(second) + shift])
-        return Bodies(tuple(self.name) + tuple(other.name), *(both(key) for key in (
-            "mass", "dof", "unit_mass", "radius", "direction", "point", "pair")),
-            both("of_point", len(self.name)))
+        values = {key: both(key) for key in ("mass", "dof", "unit_mass", "radius", "direction",
+                                             "point", "pair")}
+        return Bodies(tuple(self.name) + tuple(other.name), **values,
+                      of_point=both("of_point", len(self.name)))
 
 
 def read_bodies(file: h5py.File | Mapping[str, Any]) -> Bodies | None:
