@@ -301,3 +301,32 @@ def test_bad_input(changes, wanted):
 def test_bad_kind():
     with pytest.raises(InputError, match="wedge, cylinder"):
         fw.damper(blades(), "ball", mass=1.0, left=fw.Flank([[1, 2]], [[0.0, 0.0]]))
+
+
+@pytest.mark.parametrize(("part", "value", "wanted"), [
+    ("dof", [[5, 6, 0, 0, 0, 99]], "body/dof"), ("dof", [[5, 5, 0, 0, 0, 7]], "body/dof"),
+    ("dof", [[0] * 6], "body/dof"), ("dof", [[5, 6, 0, 0, 7]], "dof"), ("mass", [-1.0], "mass"),
+    ("mass", [np.nan], "mass"), ("unit_mass", [np.triu(np.ones((6, 6)))], "unit_mass"),
+    ("unit_mass", [np.full((6, 6), np.inf)], "unit_mass"), ("radius", [np.nan], "radius"),
+    ("direction", None, "direction"), ("name", None, "name"), ("unit_mass", None, "unit_mass"),
+    ("dof", [[1, 2, 0, 0, 0, 3]], ""),
+])
+def test_bad_bodies_of_a_file(part, value, wanted, tmp_path):
+    wedge().to_hdf5(tmp_path / "model.h5")
+    with h5py.File(tmp_path / "model.h5", "r+") as file:
+        del file[f"body/{part}"]
+        if value is not None:
+            file[f"body/{part}"] = value
+    # Dofs of blades, which springs hold, are none of a loose body: a mass on them, and no fault.
+    done = run(tmp_path, with_model(at(120.0)), status=3 if wanted else (0, 4))
+    assert wanted in done.stderr
+
+
+@pytest.mark.parametrize(("body", "wanted"), [
+    ({"mass": [0.0]}, "above 0"), ({"mass": [0.01, 0.02]}, "mass"), ({"mass": ["x"]}, "mass")])
+def test_bad_masses_of_a_case(body, wanted, tmp_path):
+    wedge().to_hdf5(tmp_path / "model.h5")
+    assert wanted in run(tmp_path, with_model(at(120.0, body=body)), status=3).stderr
+    blades().to_hdf5(tmp_path / "model.h5")
+    message = run(tmp_path, with_model(at(120.0, speed=0.0, body={"mass": [0.1]})), status=3).stderr
+    assert "no bodies" in message
