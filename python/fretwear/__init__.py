@@ -9,6 +9,8 @@ fretwear.model, fretwear.case, fretwear.settings
     The structure, and what is to be computed.
 fretwear.laws
     Contact laws made of parallel pairs.
+fretwear.dampers
+    Bodies between blades that only rotation presses.
 fretwear.analyses
     Runs of the library in this process.
 fretwear.steps
@@ -49,6 +51,7 @@ __version__: str = "0.1.0"
 from .analyses import frf, mode, resonance, run, wear
 from .bifurcation import Bifurcation
 from .case import Case
+from .dampers import Flank, damper
 from .design import calibrate, optimise
 from .elements import Damper, Polynomial
 from .errors import (
@@ -60,6 +63,7 @@ from .errors import (
     RunInterrupted,
     RunStopped,
 )
+from .loose_bodies import Bodies
 from .mistuning import Mistuning
 from .model import ContactPairs, Model, Spring
 from .populations import Population, population
@@ -70,12 +74,12 @@ from .stress import Stress
 from .user_law import Law
 from .worst_pattern import WorstPattern, worst_pattern
 
-__all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "Damper", "FretwearError", "InputError", "Law", "Mistuning", "Model", "NodalDiameter",
-           "OutputError", "Point", "Polynomial", "Population", "Result", "RunInterrupted",
-           "RunStopped", "Sectors", "Spring", "Steps", "Stress", "WorstPattern", "__version__",
-           "calibrate", "frf", "mode", "optimise", "population", "resonance", "run", "wear",
-           "worst_pattern"]
+__all__ = ["AbsentError", "Air", "Bifurcation", "Bodies", "Case", "ContactPairs",
+           "ConvergenceError", "Damper", "Flank", "FretwearError", "InputError", "Law", "Mistuning",
+           "Model", "NodalDiameter", "OutputError", "Point", "Polynomial", "Population", "Result",
+           "RunInterrupted", "RunStopped", "Sectors", "Spring", "Steps", "Stress", "WorstPattern",
+           "__version__", "calibrate", "damper", "frf", "mode", "optimise", "population",
+           "resonance", "run", "wear", "worst_pattern"]
 
 
 def __getattr__(name: str) -> object:

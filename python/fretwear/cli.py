@@ -35,6 +35,7 @@ COMMANDS = {
     "export": ("export", "mesh with deformation, contact state and wear, for ParaView"),
     "import": ("importer", "a model file from the matrices of another program"),
     "optimise": ("design.optimise_command", "parameters that make a quantity smallest or largest"),
+    "damper": ("damper_command", "a model file with a body that only rotation presses"),
     "calibrate": ("design.calibrate_command", "parameters of a case from measured curves"),
     "explore": ("explore", "a page with sliders: curve, loops and flanks follow"),
     "population": ("population_command", "many disks whose blades differ at random"),

@@ -18,6 +18,8 @@ from ._namelist import literal
 from ._native import Session, unread_parts
 from .elements import Elements, checked_elements, read_elements
 from .errors import InputError, NotBuiltError, OutputError
+from .loose_bodies import OF_PICTURES as PICTURES_OF_BODIES
+from .loose_bodies import Bodies, read_bodies
 from .mistuning import Mistuning, read_mistuning
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
@@ -168,7 +170,7 @@ class Spring:
     sector_2: int = 0
 
 
-#: A dof number, counted from 1, or a row of factors, one per dof.
+#: A number of a dof or a row, counted from 1, or a row of factors, one per dof.
 Observation = Union[int, ArrayLike]
 
 
@@ -229,6 +231,11 @@ class Model:
         2 to 4 rotation speeds [rad/s], each with the stiffness (n_dof, n_dof) there, or with a
         pair of it and of a static load (n_dof,); polynomials in the square of the speed go through
         them. In place of stiffness_rotation and static_rotation; K may be None then.
+    rows : (n_rows, n_dof), optional
+        Displacements that are combinations of dofs: sides, `observe` and elements name them by the
+        numbers n_dof + 1, n_dof + 2, ..
+    bodies : Bodies, optional
+        Bodies that no spring holds; `fretwear.damper` makes them.
     reduction : pair of floats, optional
         Up to which frequency [Hz] the model was reduced to an accuracy, and the estimated error of
         the stiffness of the joint there; runs beyond it are remarked on.
@@ -263,6 +270,7 @@ class Model:
                  mistuning: Mistuning | None = None,
                  speeds: Mapping[float, Any] | None = None,
                  reduction: tuple[float, float] | None = None,
+                 rows: ArrayLike | None = None, bodies: Bodies | None = None,
                  title: str = "", unit_system: str = "") -> None:
         if sectors is not None and not isinstance(sectors, Sectors):
             raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
@@ -295,22 +303,29 @@ class Model:
         if load_table is not None:
             self._moved["load/table"] = np.ascontiguousarray(
                 array("load_table", load_table, (None, 2)))
+        if rows is not None:
+            self._moved["row/matrix"] = np.ascontiguousarray(array("rows", rows, (None, n)))
+        #: Numbers that sides may have: dofs, and the rows behind them.
+        sides = n + len(self._moved.get("row/matrix", ()))
         if contact is not None and not isinstance(contact, ContactPairs):
             raise InputError(f"contact: is a {type(contact).__name__}, must be ContactPairs")
-        self.contact = None if contact is None else contact.checked(n)
+        self.contact = None if contact is None else contact.checked(sides)
         self.springs = tuple(springs)
         for number, spring in enumerate(self.springs):
             if not isinstance(spring, Spring):
                 raise InputError(f"springs[{number}]: is a {type(spring).__name__}, must be a "
                                  "Spring")
-            dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
+            dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), sides)
             array(f"springs[{number}].coefficient", spring.coefficient, ())
-        self.elements = checked_elements(elements, n)
+        self.elements = checked_elements(elements, sides)
         laws = tuple(laws)
         for number, law in enumerate(laws):
             if not isinstance(law, Law):
                 raise InputError(f"laws[{number}]: is a {type(law).__name__}, must be a Law")
-        self.laws = tuple(law.checked(number, n) for number, law in enumerate(laws))
+        self.laws = tuple(law.checked(number, sides) for number, law in enumerate(laws))
+        if bodies is not None and not isinstance(bodies, Bodies):
+            raise InputError(f"bodies: is a {type(bodies).__name__}, must be Bodies")
+        self.bodies = None if bodies is None else bodies.checked(n)
         self.sectors = None if sectors is None else sectors.checked(n)
         if stress is not None and not isinstance(stress, Stress):
             raise InputError(f"stress: is a {type(stress).__name__}, must be Stress")
@@ -325,7 +340,7 @@ class Model:
             self._moved.update(zip(_REDUCTION, array("reduction", reduction, (2,)).reshape(2, 1)))
         #: Datasets of matrices at several speeds.
         self._speeds = {} if speeds is None else speed_datasets(speeds, n)
-        self._observe = None if observe is None else _rows(observe, n)
+        self._observe = None if observe is None else _rows(observe, self.rows, n)
         if observe is not None and self._diameter_names() is not None:
             raise InputError("observe: is given beside rows of nodal diameters, must be one of "
                              "both")
@@ -429,6 +444,11 @@ class Model:
         return 0 if self.contact is None else len(np.asarray(self.contact.side_1))
 
     @property
+    def rows(self) -> Floats:
+        """Displacements that are combinations of dofs (n_rows, n_dof), read-only."""
+        return _read_only(self._moved.get("row/matrix", np.zeros((0, self.n_dof))))
+
+    @property
     def observe(self) -> dict[str, Floats] | None:
         """Row of factors (n_dof,) of every observed quantity; None for every dof."""
         if self._observe is None:
@@ -477,7 +497,7 @@ class Model:
             found = {name: file[name][()] for name in (
                 "mass", "stiffness", "damping", "stiffness_rotation", *_MATRICES,
                 *_CONTACT, *_LOADS, "contact/law", "contact/normal_law", "contact/table",
-                "base/dof", "base/direction", "load/table",
+                "base/dof", "base/direction", "load/table", "row/matrix",
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
             loads.update((name, found.get(name)) for name in _MATRICES)
@@ -491,7 +511,8 @@ class Model:
                     base_dof=found.get("base/dof"), base_direction=found.get("base/direction"),
                     load_table=found.get("load/table"), stress=read_stress(file),
                     mistuning=read_mistuning(file), speeds=read_speeds(file),
-                    reduction=_reduction_of(file),
+                    reduction=_reduction_of(file), rows=found.get("row/matrix"),
+                    bodies=read_bodies(file),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:
@@ -581,6 +602,8 @@ class Model:
             found.update(self.stress.datasets())
         if self.mistuning is not None:
             found.update(self.mistuning.datasets())
+        if self.bodies is not None:
+            found.update(self.bodies.datasets())
         if self._observe is not None:
             found["observe/name"] = strings(self._observe[0])
             found["observe/matrix"] = self._observe[1]
@@ -599,7 +622,7 @@ class Model:
         if self.sectors is not None:
             session.put("cyclic/n_sectors", np.array([self.sectors.n_sectors], dtype=np.int32))
         for name, values in self._datasets().items():
-            if name.removeprefix("stress/") in OF_PICTURES:
+            if name.removeprefix("stress/") in OF_PICTURES or name in PICTURES_OF_BODIES:
                 continue
             if not name.startswith("observe/") and values.dtype.kind in "if":
                 session.put(name, values)
@@ -611,6 +634,8 @@ class Model:
                 session.put_texts(f"{group}/kind", [kind])
         for law in self.laws:
             session.add_law(law)
+        if self.bodies is not None:
+            session.put_texts("body/name", list(self.bodies.name))
         for name in ("title", "unit_system"):
             if getattr(self, name):
                 session.put_texts(name, [getattr(self, name)])
@@ -717,7 +742,8 @@ def _waves_of(file: h5py.File) -> dict[int, tuple[ArrayLike, ArrayLike]] | None:
     return found
 
 
-def _rows(observe: Mapping[str, Observation], n_dof: int) -> tuple[tuple[str, ...], Floats]:
+def _rows(observe: Mapping[str, Observation], of_model: Floats,
+          n_dof: int) -> tuple[tuple[str, ...], Floats]:
     if not isinstance(observe, Mapping):
         raise InputError(f"observe: is a {type(observe).__name__}, must be a dictionary of names")
     rows = np.zeros((len(observe), n_dof), order="F")
@@ -725,9 +751,13 @@ def _rows(observe: Mapping[str, Observation], n_dof: int) -> tuple[tuple[str, ..
         text("observe, a name", name)
         argument = f"observe['{name}']"
         if isinstance(wanted, (int, np.integer)):
-            if not 1 <= wanted <= n_dof:
-                raise InputError(f"{argument} = {wanted}: must be a dof from 1 to {n_dof}")
-            rows[i, wanted - 1] = 1.0
+            if not 1 <= wanted <= n_dof + len(of_model):
+                raise InputError(f"{argument} = {wanted}: must be a dof from 1 to {n_dof}, or a "
+                                 f"row behind them, up to {n_dof + len(of_model)}")
+            if wanted > n_dof:
+                rows[i] = of_model[wanted - n_dof - 1]
+            else:
+                rows[i, wanted - 1] = 1.0
         else:
             rows[i] = array(argument, wanted, (n_dof,))
     return tuple(observe), rows

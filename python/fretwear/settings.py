@@ -12,10 +12,10 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["UNITS", "Base", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic", "Damper",
-           "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output", "Polynomial",
-           "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Stress",
-           "Structure", "Sweep", "Time", "User", "Wear"]
+__all__ = ["UNITS", "Base", "Body", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic",
+           "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output",
+           "Polynomial", "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring",
+           "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -32,6 +32,7 @@ UNITS: dict[str, str] = {
     "model%rayleigh_stiffness": "s",
     "model%modal_damping_up_to": "Hz",
     "model%rotation_speed": "rad/s",
+    "body%mass": "M",
     "mistuning%rows": "M^0.5",
     "mistuning%row_omega": "rad/s",
     "mistuning%blade_stiffness": "F/L",
@@ -130,7 +131,7 @@ class Resonance(_Resonance, total=False):
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
                        "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
                        "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
-                       "mistuning%scale"]
+                       "mistuning%scale", "body%mass"]
     #: first value, or factor; only: analysis = 'resonance' (required, else 0)
     start: float
     #: last value, or factor; only: analysis = 'resonance' (required, else 0)
@@ -178,6 +179,12 @@ class Structure(TypedDict, total=False):
     stiffness_unsymmetric: ArrayLike
     #: [F s/L] added to the damping as it is (default: 0)
     damping_unsymmetric: ArrayLike
+    #: displacements that are combinations of dofs: sides, term_dof and observe name them by n_dof +
+    #: 1, .. (default: of the file, else 0)
+    n_rows: int
+    #: weight of each dof in each of them, row after row (default: of the file, else required with
+    #: n_rows)
+    row: ArrayLike
     #: [1/s] adds this times M to the damping (default: 0)
     rayleigh_mass: float
     #: [s] adds this times K, with rotation, to the damping (default: 0)
@@ -193,6 +200,13 @@ class Structure(TypedDict, total=False):
     #: adds i times this part of the stiffness, with rotation, in harmonics above 0: hysteretic
     #: damping (default: 0)
     loss_factor: float
+
+
+class Body(TypedDict, total=False):
+    """Group &body: bodies of the model that no spring holds."""
+
+    #: [M] of each body of the model, in place of its own (default: of the file)
+    mass: ArrayLike
 
 
 class Cyclic(TypedDict, total=False):
@@ -474,7 +488,7 @@ class Load(TypedDict, total=False):
     sine: ArrayLike
     #: loads on single dofs in any harmonic, added to the others (default: 0)
     n_terms: int
-    #: dof; negative: with its sign turned (required with n_terms)
+    #: dof, or n_dof and a row; negative: with its sign turned (required with n_terms)
     term_dof: ArrayLike
     #: harmonic, 0 to n_harmonics (default: 1, or by term_order)
     term_harmonic: ArrayLike
@@ -571,7 +585,7 @@ class Sweep(_Sweep, total=False):
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
                        "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
                        "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
-                       "mistuning%scale"]
+                       "mistuning%scale", "body%mass"]
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)
@@ -788,8 +802,8 @@ class Output(TypedDict, total=False):
     #: highest harmonic of the answer that is given back, above those of the balance; 0: theirs;
     #: only: law = 'rigid' (default: 0)
     tail: int
-    #: which displacements are written; a dof number k is called uk (default: all that the model
-    #: file names, else every dof)
+    #: which displacements are written; a dof number k is called uk, n_dof + k rowk (default: all
+    #: that the model file names, else every dof)
     observe: str | int | Sequence[str | int]
 
 
@@ -814,6 +828,7 @@ class Groups(TypedDict, total=False):
     sensitivity: Sensitivity
     resonance: Resonance
     structure: Structure
+    body: Body
     cyclic: Cyclic
     population: Population
     mistuning: Mistuning

@@ -43,7 +43,9 @@ def whole(**more: Any) -> fw.Model:
                     circulatory=0.0 * EYE, stiffness_unsymmetric=EYE, damping_unsymmetric=EYE,
                     harmonic={2: (EYE[0], EYE[1])},
                     observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N",
-                    load_table=[[1.0, 0.5], [2.0, 1.5]],
+                    load_table=[[1.0, 0.5], [2.0, 1.5]], rows=EYE[:2], bodies=fw.Bodies(
+                        ["wedge"], [0.1], [[4, 5, 0, 0, 0, 6]], [np.eye(6)], [1.0], [[0, 1, 0]],
+                        [[0.0, 1.0, 0.0]], [0], [0]),
                     stress=fw.Stress(np.ones((2, 6, 6)), np.ones((2, 6)), np.ones((2, 6)),
                                      [1.0, 2.0], [2.0, 3.0], np.zeros((2, 3)), [0, 1]), **more)
 

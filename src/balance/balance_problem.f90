@@ -49,6 +49,8 @@ module fw_balance_problem
       !> Norm of the vibratory load on the structure [force], below whose round-off no load of the
       !> joint is one; 0 where it is not known.
       real(wp) :: load_size = 0.0_wp
+      !> Bodies that nothing but pairs holds: which one each pair of a sector touches, 0 for none.
+      integer, allocatable :: body_of_pair(:)
       !> How it was built.
       type(problem_origin) :: origin
    contains

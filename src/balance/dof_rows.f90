@@ -5,14 +5,18 @@ module fw_dof_rows
    use fw_contact_data, only: contact_type, spring_type
    use fw_force_law, only: pair_mixed, pair_open
    use fw_kinds, only: wp
+   use fw_side, only: terms_of
    implicit none (type, external)
    private
 
    public :: dof_row, list_rows, strains
 
    type :: dof_row
-      !> Signed dof numbers, 0 for ground.
+      !> Signed numbers of dofs and rows of the model, 0 for ground.
       integer :: side(2) = 0
+      !> The dofs of both, and the weights of side 1 less side 2.
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
       !> What a motion finds there in proportion to itself [force/length].
       real(wp) :: stiffness = 0.0_wp
       !> It does not move at all: a rigid pair that bears.
@@ -33,10 +37,12 @@ module fw_dof_rows
 contains
 
    !> Rows of all springs, then of all components of pairs that are there.
-   subroutine list_rows(system, contact, springs, rows)
+   subroutine list_rows(system, contact, springs, of_model, rows)
       type(balance_state), intent(in) :: system
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
+      !> Rows of the model, as in fw_side.
+      real(wp), allocatable, intent(in) :: of_model(:, :)
       type(dof_row), allocatable, intent(out) :: rows(:)
       integer :: c, i, n
 
@@ -53,7 +59,23 @@ contains
          end do
       end do
       rows = rows(:n)
+      do i = 1, n
+         call take_sides(of_model, rows(i))
+      end do
    end subroutine list_rows
+
+   !> Side 1 less side 2; negative numbers count the other way.
+   pure subroutine take_sides(of_model, row)
+      real(wp), allocatable, intent(in) :: of_model(:, :)
+      type(dof_row), intent(inout) :: row
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
+
+      call terms_of(row%side(1), row%dof, row%weight, of_model)
+      call terms_of(-row%side(2), dof, weight, of_model)
+      row%dof = [row%dof, dof]
+      row%weight = [row%weight, weight]
+   end subroutine take_sides
 
    !> Springs come first in the list of laws.
    pure type(dof_row) function row_of_spring(system, springs, i) result(row)
@@ -113,9 +135,8 @@ contains
       integer :: k
 
       values = 0.0_wp
-      do k = 1, 2
-         if (self%side(k) == 0) cycle
-         values = values + real(weight(self, k), wp)*u(abs(self%side(k)), :)
+      do k = 1, size(self%dof)
+         values = values + self%weight(k)*u(self%dof(k), :)
       end do
    end function elongation
 
@@ -125,14 +146,12 @@ contains
       real(wp), intent(inout) :: matrix(:, :), sizes(:, :)
       integer :: j, k
 
-      do j = 1, 2
-         if (self%side(j) == 0) cycle
-         do k = 1, 2
-            if (self%side(k) == 0) cycle
-            associate (row => abs(self%side(j)), column => abs(self%side(k)))
-               matrix(row, column) = matrix(row, column) + &
-                                     weight(self, j)*weight(self, k)*self%stiffness
-               sizes(row, column) = sizes(row, column) + abs(self%stiffness)
+      do j = 1, size(self%dof)
+         do k = 1, size(self%dof)
+            associate (row => self%dof(j), column => self%dof(k), &
+                       part => self%weight(j)*self%weight(k)*self%stiffness)
+               matrix(row, column) = matrix(row, column) + part
+               sizes(row, column) = sizes(row, column) + abs(part)
             end associate
          end do
       end do
@@ -145,10 +164,9 @@ contains
       real(wp), intent(inout) :: product(:, :)
       integer :: k
 
-      do k = 1, 2
-         if (self%side(k) == 0) cycle
-         associate (row => product(abs(self%side(k)), :))
-            row = row - weight(self, k)*self%stiffness*self%elongation(u)
+      do k = 1, size(self%dof)
+         associate (row => product(self%dof(k), :))
+            row = row - self%weight(k)*self%stiffness*self%elongation(u)
          end associate
       end do
    end subroutine take_from
@@ -161,10 +179,9 @@ contains
       complex(wp), intent(inout) :: load(:)
       integer :: k
 
-      do k = 1, 2
-         if (self%side(k) == 0) cycle
-         associate (entry => load(abs(self%side(k))))
-            entry = entry + weight(self, k)*cmplx(force(1), -force(2), wp)
+      do k = 1, size(self%dof)
+         associate (entry => load(self%dof(k)))
+            entry = entry + self%weight(k)*cmplx(force(1), -force(2), wp)
          end associate
       end do
    end subroutine add_force
@@ -187,14 +204,6 @@ contains
          strains = strains .or. norm2(rows(i)%elongation(parts)) > moves*maxval(abs(v))
       end do
    end function strains
-
-   !> Side 1 less side 2; negative numbers are dofs that count the other way.
-   pure integer function weight(self, k)
-      type(dof_row), intent(in) :: self
-      integer, intent(in) :: k
-
-      weight = merge(1, -1, k == 1)*merge(1, -1, self%side(k) > 0)
-   end function weight
 
    !> Whether rows are as stiff as others were.
    elemental logical function is_like(self, other)

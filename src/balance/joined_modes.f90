@@ -98,7 +98,7 @@ contains
       do i = 1, size(rows)
          if (.not. rows(i)%is_held) call rows(i)%add_to(self%stiffness, self%sizes)
       end do
-      call self%add_holds(t)
+      call self%add_holds(model%rows, t)
       k = matmul(transpose(t), matmul(self%stiffness, t))
       m = matmul(transpose(t), matmul(model%mass, t))
       done = .false.
@@ -117,15 +117,17 @@ contains
    end subroutine find_joined_modes
 
    !> u = t eta of all motions that the held rows leave.
-   subroutine add_holds(self, t)
+   subroutine add_holds(self, of_model, t)
       class(joined_modes), intent(inout) :: self
+      !> Rows of the model.
+      real(wp), allocatable, intent(in) :: of_model(:, :)
       real(wp), allocatable, intent(out) :: t(:, :)
       integer, allocatable :: held(:)
       integer :: i, j
 
       held = pack([(i, i=1, size(self%rows))], self%rows%is_held)
       call new_relative(size(self%stiffness, 1), [(self%rows(held(i))%side(1), i=1, size(held))], &
-                        [(self%rows(held(i))%side(2), i=1, size(held))], self%held)
+                        [(self%rows(held(i))%side(2), i=1, size(held))], self%held, of_model)
       allocate (t(size(self%stiffness, 1), size(self%held%free)), source=0.0_wp)
       t(self%held%pivot, :) = -self%held%r
       do j = 1, size(self%held%free)

@@ -11,6 +11,7 @@ module fw_joint
    use fw_laws, only: facts_of, pairs_are_rigid
    use fw_model, only: model_type
    use fw_relative, only: relative_type, new_relative
+   use fw_side, only: add_side, largest_weight, terms_of
    use fw_text, only: to_text
    implicit none (type, external)
    private
@@ -77,8 +78,8 @@ contains
          do c = 1, 3
             ! Ground against ground: the component is absent.
             if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
-            self%idle(c, i) = .not. (moving(abs(contact%side_1(c, i))) .or. &
-                                     moving(abs(contact%side_2(c, i))))
+            self%idle(c, i) = .not. any(moving(dofs_of(model, [contact%side_1(c, i), &
+                                                               contact%side_2(c, i)])))
             if (self%idle(c, i) .and. skip_idle) then
                self%n_idle = self%n_idle + 1
                cycle
@@ -98,6 +99,8 @@ contains
       end if
       n_others = n_rows + n_springs
       call list_elements(elements, n_others, side_1, side_2, sector_2, self%element_row)
+      call check_differ(model, side_1, side_2, sector_2, error)
+      if (allocated(error)) return
       n_own = 0
       if (allocated(model%cyclic%deviation)) n_own = size(model%cyclic%deviation%rows, 1)
       if (model%cyclic%is_mistuned) call repeat_rows(model%cyclic%n_sectors, n_pairs, n_rows, &
@@ -114,12 +117,51 @@ contains
          end if
          if (.not. model%cyclic%is_alone) return
          allocate (self%alone)
-         call new_relative(model%n_dof, side_1, side_2, self%alone)
+         call new_relative(model%n_dof, side_1, side_2, self%alone, model%rows)
          return
       end if
-      call new_relative(model%n_dof, side_1, side_2, self%relative)
+      call new_relative(model%n_dof, side_1, side_2, self%relative, model%rows)
       call check_independent(contact, self, error)
    end subroutine new_joint
+
+   !> Rows of the model may say the same displacement by other numbers, which a reader sees of dofs.
+   subroutine check_differ(model, side_1, side_2, sector_2, error)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: side_1(:), side_2(:), sector_2(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: round_off = 1.0e-10_wp
+      real(wp) :: row(model%n_dof)
+      integer :: r
+
+      if (.not. allocated(model%rows)) return
+      do r = 1, size(side_1)
+         if (sector_2(r) /= 0) cycle
+         row = 0.0_wp
+         call add_side(side_1(r), 1.0_wp, row, model%rows)
+         call add_side(side_2(r), -1.0_wp, row, model%rows)
+         if (maxval(abs(row)) > round_off*largest_weight(side_1(r), model%rows)) cycle
+         call fatal_error(error, 'sides '//to_text(side_1(r))//' and '//to_text(side_2(r))// &
+                          ' of a pair, a spring or another element are the same displacement '// &
+                          'by model%row: they must differ', status_input)
+         return
+      end do
+   end subroutine check_differ
+
+   !> The dofs that sides are made of.
+   pure function dofs_of(model, sides) result(dofs)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: sides(:)
+      integer, allocatable :: dofs(:)
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
+      integer :: i
+
+      allocate (dofs(0))
+      do i = 1, size(sides)
+         call terms_of(sides(i), dof, weight, model%rows)
+         dofs = [dofs, dof]
+      end do
+   end function dofs_of
 
    !> Rows of the inputs of elements, behind those that there are: one for each difference of dofs.
    pure subroutine list_elements(elements, n_before, side_1, side_2, sector_2, element_row)
@@ -259,8 +301,8 @@ contains
          call fatal_error(error, '&contact pair '//to_text(place(2))//', '// &
                           trim(component(place(1)))//': in nodal diameter '//to_text(k)// &
                           ' its relative displacement vanishes or follows from that of earlier '// &
-                          'pairs, so rigid contact forces are not determined; remove the pair '// &
-                          'or use law = ''penalty''', status_input)
+                          'pairs, so rigid contact forces are not determined; remove the '// &
+                          'pair, use law = ''penalty'', or give a body compliance', status_input)
          return
       end do
    end subroutine turn_joint
@@ -293,7 +335,8 @@ contains
          ! With the speed it may come to do so.
          if (allocated(contact%gap_rotation)) interferes = interferes .or. &
             contact%gap_rotation(i) < 0.0_wp
-         if (interferes) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) = .true.
+         if (interferes) moving(dofs_of(model, [contact%side_1(3, i), contact%side_2(3, i)])) = &
+            .true.
       end do
       ! The ground passes no motion on.
       moving(0) = .false.
@@ -320,11 +363,11 @@ contains
          end do
          do i = 1, contact%n_pairs
             do c = 1, 3
-               call couple(contact%side_1(c, i), contact%side_2(c, i))
+               call couple([contact%side_1(c, i), contact%side_2(c, i)])
             end do
          end do
          do i = 1, springs%n_springs
-            call couple(springs%side_1(i), springs%side_2(i))
+            call couple([springs%side_1(i), springs%side_2(i)])
          end do
          call couple_elements()
          if (allocated(model%cyclic%air)) then
@@ -334,7 +377,7 @@ contains
          end if
          if (allocated(model%cyclic%left)) then
             do i = 1, size(model%cyclic%left)
-               call couple(model%cyclic%left(i), model%cyclic%right(i))
+               call couple([model%cyclic%left(i), model%cyclic%right(i)])
             end do
          end if
          if (count(moving) == n_moving) exit
@@ -357,25 +400,24 @@ contains
          moving(1:) = moving(1:) .or. any(abs(rows) > 0.0_wp, dim=1)
       end subroutine couple_rows
 
-      subroutine couple(side_1, side_2)
-         integer, intent(in) :: side_1, side_2
+      !> All dofs of some sides hang together.
+      subroutine couple(sides)
+         integer, intent(in) :: sides(:)
+         integer, allocatable :: dofs(:)
 
-         if (moving(abs(side_1)) .or. moving(abs(side_2))) moving(abs([side_1, side_2])) = .true.
-         moving(0) = .false.
+         dofs = dofs_of(model, sides)
+         if (any(moving(dofs))) moving(dofs) = .true.
       end subroutine couple
 
       !> All inputs of an element hang together.
       subroutine couple_elements()
          integer :: e, k
-         integer, allocatable :: dofs(:)
 
          if (.not. allocated(elements%slot)) return
          do k = 1, size(elements%slot)
             associate (group => elements%slot(k)%group)
                do e = 1, group%n_elements
-                  dofs = abs([group%row_side_1(:, e), group%row_side_2(:, e)])
-                  if (any(moving(dofs))) moving(dofs) = .true.
-                  moving(0) = .false.
+                  call couple([group%row_side_1(:, e), group%row_side_2(:, e)])
                end do
             end associate
          end do
@@ -429,8 +471,8 @@ contains
             if (self%relative%independent(self%row(c, i))) cycle
             call fatal_error(error, '&contact pair '//to_text(i)//', '//trim(component(c))// &
                              ': its relative displacement follows from that of earlier pairs, '// &
-                             'so rigid contact forces are not determined; remove the pair or '// &
-                             'use law = ''penalty''', status_input)
+                             'so rigid contact forces are not determined; remove the pair, '// &
+                             'use law = ''penalty'', or give a body compliance', status_input)
             return
          end do
       end do

@@ -14,6 +14,7 @@ module fw_tail
    use fw_model, only: model_type
    use fw_point, only: point_type
    use fw_recovery, only: largest_magnitude
+   use fw_side, only: terms_of
    implicit none (type, external)
    private
 
@@ -69,8 +70,8 @@ contains
 
       allocate (u(model%n_dof, 1), source=(0.0_wp, 0.0_wp))
       ! u_r = u(side 1) - u(side 2): the load is -B^T lambda, on side 1, and its reaction on side 2.
-      call add_forces(contact%side_1, -1.0_wp, force, u(:, 1))
-      call add_forces(contact%side_2, 1.0_wp, force, u(:, 1))
+      call add_forces(model, contact%side_1, -1.0_wp, force, u(:, 1))
+      call add_forces(model, contact%side_2, 1.0_wp, force, u(:, 1))
       call lu%reserve(model%n_dof)
       lu%matrix = cmplx(model%stiffness - s**2*model%mass, s*model%damping + &
                         model%loss_factor*model%stiffness, wp)
@@ -82,18 +83,19 @@ contains
    end subroutine answer_to
 
    !> Add the forces on one side of all pairs to the dofs.
-   pure subroutine add_forces(side, sign_of_side, force, load)
+   pure subroutine add_forces(model, side, sign_of_side, force, load)
+      type(model_type), intent(in) :: model
       integer, intent(in) :: side(:, :)
       real(wp), intent(in) :: sign_of_side, force(:, :, :)
       complex(wp), intent(inout) :: load(:)
-      integer :: c, dof, i
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
+      integer :: c, i
 
       do i = 1, size(side, 2)
          do c = 1, 3
-            dof = abs(side(c, i))
-            if (dof == 0) cycle
-            ! A negative number of a dof means that it points the other way.
-            load(dof) = load(dof) + sign(sign_of_side, real(side(c, i), wp)*sign_of_side)* &
+            call terms_of(side(c, i), dof, weight, model%rows)
+            load(dof) = load(dof) + sign_of_side*weight* &
                         cmplx(force(i, c, 1), -force(i, c, 2), wp)
          end do
       end do

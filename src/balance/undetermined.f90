@@ -132,7 +132,7 @@ contains
 
       allocate (found(0))
       if (.not. self%is_needed) return
-      call list_rows(system, self%contact, self%springs, rows)
+      call list_rows(system, self%contact, self%springs, self%model%rows, rows)
       if (.not. self%modes%fit(rows)) call find_joined_modes(self%model, rows, self%modes)
       associate (fourier => system%problem%fourier)
          do h = 1, fourier%n_retained
@@ -355,8 +355,8 @@ contains
       integer :: k
 
       scale_of = tiny(1.0_wp)
-      do k = 1, 2
-         if (row%side(k) /= 0) scale_of = max(scale_of, sizes(abs(row%side(k)), abs(row%side(k))))
+      do k = 1, size(row%dof)
+         scale_of = max(scale_of, sizes(row%dof(k), row%dof(k)))
       end do
    end function scale_of
 

@@ -10,7 +10,7 @@ module fw_key_range
    private
 
    public :: range_type
-   public :: above, at_least, at_most, below, from_to, dof_numbers, whole
+   public :: above, at_least, at_most, below, from_to, dof_numbers, side_numbers, whole
    public :: operator(.and.)
 
    !> What a number may be; a bound that is huge does not bind.
@@ -21,7 +21,7 @@ module fw_key_range
       real(wp) :: least = -huge(1.0_wp), most = huge(1.0_wp)
       !> Name of the size that bounds the number on either side of 0, or blank.
       !> The bound itself is known only with the model, so the reader tests it, not `holds`.
-      character(12) :: within = ''
+      character(16) :: within = ''
       !> Whether a real has to be a whole number.
       logical :: whole = .false.
    contains
@@ -99,6 +99,11 @@ contains
    pure type(range_type) function dof_numbers() result(range)
       range%within = 'n_dof'
    end function dof_numbers
+
+   !> Numbers of dofs, or of rows of the model, which follow them.
+   pure type(range_type) function side_numbers() result(range)
+      range%within = '(n_dof+n_rows)'
+   end function side_numbers
 
    !> Both ends included, and nothing between whole numbers.
    pure type(range_type) function whole(least, most) result(range)

@@ -4,6 +4,7 @@ module fw_body
    use fw_contact_data, only: contact_type, spring_type
    use fw_elements, only: element_list
    use fw_kinds, only: wp
+   use fw_loose_bodies, only: loose_bodies
    use fw_model, only: model_type
    use fw_model_forming, only: model_origin
    implicit none (type, external)
@@ -23,6 +24,8 @@ module fw_body
       !> Lowest and highest value of a parameter of the matrices that changes so.
       real(wp) :: varied_span(2) = 0.0_wp
       type(model_origin), allocatable :: origin
+      !> Bodies that no spring holds, where there are any.
+      type(loose_bodies), allocatable :: bodies
    contains
       procedure :: has_joint
       procedure :: is_nonlinear
@@ -47,6 +50,7 @@ contains
       body%contact = self%contact
       body%springs = self%springs
       body%elements = self%elements
+      if (allocated(self%bodies)) body%bodies = self%bodies
       body%model = self%model%at_frequency(omega)
       if (allocated(body%model%cyclic%speed)) deallocate (body%model%cyclic%speed)
    end subroutine stand_at

@@ -9,7 +9,7 @@ module fw_model_forming
    use fw_raw_model, only: raw_model
    use fw_speed_growth, only: even_powers, slopes_of_powers, speed_growth
    use fw_model_keys, only: model_options
-   use fw_parameters, only: is_of_matrices, loss_factor, modal_damping, rayleigh_mass, &
+   use fw_parameters, only: body_mass, is_of_matrices, loss_factor, modal_damping, rayleigh_mass, &
       rayleigh_stiffness, rotation_speed
    implicit none (type, external)
    private
@@ -235,7 +235,7 @@ contains
       type(model_type), intent(in) :: model
       type(matrix_change), intent(out) :: change
       type(error_type), allocatable, intent(out) :: error
-      integer :: n
+      integer :: i, n
 
       n = model%n_dof
       change%parameter = parameter
@@ -259,6 +259,15 @@ contains
       case (rotation_speed)
          call change_by_speed(options, raw, model, change, error)
          change%value = options%rotation_speed
+      case (body_mass)
+         allocate (change%mass(n, n), source=0.0_wp)
+         do i = 1, raw%bodies%count()
+            change%mass = change%mass + raw%bodies%unit_matrix(i, n)
+            change%load_static = change%load_static + options%static_scale* &
+                                 options%rotation_speed**2*raw%bodies%unit_load(i, n)
+         end do
+         change%damping = options%rayleigh_mass*change%mass
+         change%value = raw%bodies%mass(1)
       case default ! changes no matrix
       end select
    end subroutine find_change

@@ -6,7 +6,7 @@ module fw_parameter_values
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_forming, only: form_structure
-   use fw_parameters, only: blade_frequency, friction_coefficient, gap, harmonic_scale, &
+   use fw_parameters, only: blade_frequency, body_mass, friction_coefficient, gap, harmonic_scale, &
       is_of_elements, is_of_matrices, is_of_sectors, is_per_pair, is_per_spring, loss_factor, &
       mistuning_scale, modal_damping, normal_load, normal_stiffness, parameter_group, &
       parameter_key, rayleigh_mass, rayleigh_stiffness, rotation_speed, static_scale, &
@@ -168,6 +168,10 @@ contains
          case (rayleigh_mass); options%rayleigh_mass = value
          case (rayleigh_stiffness); options%rayleigh_stiffness = value
          case (loss_factor); options%loss_factor = value
+         case (body_mass)
+            call case%origin%raw%bodies%set_mass(value, case%origin%raw%mass, &
+                                                 case%origin%raw%growth%load)
+            if (allocated(case%bodies)) case%bodies%mass = value
          case default ! changes no matrix
          end select
       end associate

@@ -8,12 +8,14 @@ module fw_raw_model
    use fw_kinds, only: wp
    use fw_law_text, only: all_laws
    use fw_laws, only: law_words
+   use fw_loose_bodies, only: loose_bodies
    use fw_mistuning_parts, only: mistuning_parts
    use fw_speed_growth, only: speed_growth
    use fw_speed_parts, only: speed_parts
    use fw_stress_parts, only: stress_parts
    use fw_normal_law, only: normal_words
    use fw_part_keys, only: part_keys
+   use fw_side, only: add_side
    use fw_part, only: by_columns, either_way, part, part_source, part_type
    use fw_text, only: string_type, to_text
    implicit none (type, external)
@@ -42,6 +44,8 @@ module fw_raw_model
       !> Loads (n_dof) [force]; the last per square of the rotation speed.
       real(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
       real(wp), allocatable :: load_static_rotation(:)
+      !> Displacements that are combinations of dofs (n_dof, n_rows).
+      real(wp), allocatable :: rows(:, :)
       !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
       type(string_type), allocatable :: observe_name(:)
       real(wp), allocatable :: observe_matrix(:, :)
@@ -64,6 +68,8 @@ module fw_raw_model
       type(stress_parts) :: stress
       !> How sectors differ from the tuned one.
       type(mistuning_parts), allocatable :: mistuning
+      !> Bodies that no spring holds.
+      type(loose_bodies), allocatable :: bodies
       !> Hysteretic damping, symmetric (n_dof, n_dof) [force/length].
       real(wp), allocatable :: structural_damping(:, :)
       !> Of any shape (n_dof, n_dof): stiffness per rotation speed, stiffness and damping.
@@ -98,6 +104,9 @@ contains
 
       call bind_structure(self, to)
       call self%speeds%bind_parts(to)
+      call to%bind(part('row/matrix', 'combination dof', 'displacements that are combinations '// &
+                        'of dofs, which sides may name by n_dof + 1, ..', storage=by_columns), &
+                   self%rows)
       call bind_pairs(self%contact, to)
       call bind_springs(self%springs, to)
       call bind_elements(self%elements, to)
@@ -107,6 +116,8 @@ contains
       call self%cyclic%bind_parts(to)
       if (.not. allocated(self%mistuning)) allocate (self%mistuning)
       call self%mistuning%bind_parts(self%cyclic%n_sectors, to)
+      if (.not. allocated(self%bodies)) allocate (self%bodies)
+      call self%bodies%bind_parts(to)
       call self%stress%bind_parts(to)
       call note_mesh(to)
    end subroutine bind_parts
@@ -346,25 +357,27 @@ contains
       class(part_source), intent(inout) :: to
       integer, allocatable :: dof(:)
       type(part_type) :: dofs
-      integer :: i, n
+      integer :: i, n, n_rows
 
       call to%bind(part('observe/name', 'quantity', 'names, with one of the two that follow', &
                         'with /observe'), self%observe_name)
-      dofs = part('observe/dof', 'quantity', 'signed dof numbers')
+      dofs = part('observe/dof', 'quantity', 'signed numbers of dofs, or n_dof and a row')
       call to%bind(dofs, dof)
       call to%bind(part('observe/matrix', 'quantity dof', 'a linear combination of dofs each'), &
                    self%observe_matrix)
       if (.not. allocated(dof) .or. allocated(self%observe_matrix)) return
       n = self%order()
+      n_rows = 0
+      if (allocated(self%rows)) n_rows = size(self%rows, 2)
       allocate (self%observe_matrix(size(dof), n), source=0.0_wp)
       do i = 1, size(dof)
-         if (dof(i) == 0 .or. abs(dof(i)) > n) then
+         if (dof(i) == 0 .or. abs(dof(i)) > n + n_rows) then
             call to%refuse(dofs, to_text(dof(i))//' at index '//to_text(i - 1), &
-                           '1 to '//to_text(n)//' or its negative')
+                           '1 to '//to_text(n + n_rows)//' or its negative')
             return
          end if
          ! A negative number observes the dof with its sign turned.
-         self%observe_matrix(i, abs(dof(i))) = real(sign(1, dof(i)), wp)
+         call add_side(dof(i), 1.0_wp, self%observe_matrix(i, :), self%rows)
       end do
    end subroutine bind_observed
 

@@ -8,6 +8,7 @@ module fw_joint_modes
    use fw_laws, only: build_law
    use fw_pair_law, only: pair_law
    use fw_sector_modes, only: find_sector_modes
+   use fw_side, only: terms_of
    implicit none (type, external)
    private
 
@@ -147,8 +148,9 @@ contains
 
       stiffness = case%model%stiffness
       do i = 1, case%springs%n_springs
-         if (case%springs%power(i) == 1) call add_spring(case%springs%side_1(i), &
-            case%springs%side_2(i), case%springs%coefficient(i), stiffness)
+         if (case%springs%power(i) == 1) call add_spring(case%model%rows, &
+            [case%springs%side_1(i), case%springs%side_2(i)], case%springs%coefficient(i), &
+            stiffness)
       end do
       if (state == state_free) return
       rigid = hold*maxval(abs(stiffness))
@@ -157,31 +159,37 @@ contains
          do i = 1, contact%n_pairs
             do c = merge(1, 3, state == state_stuck), 3
                if (.not. law%prediction%takes(i) .and. law%prediction%order_of(i, c) == 0) then
-                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), &
+                  call add_spring(case%model%rows, [contact%side_1(c, i), contact%side_2(c, i)], &
                                   law%prediction%stiffness(i, c), stiffness)
                else
                   ! A law of positions that takes the balance, or a law of velocities: held
                   ! rigidly.
-                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), rigid, stiffness)
+                  call add_spring(case%model%rows, [contact%side_1(c, i), contact%side_2(c, i)], &
+                                  rigid, stiffness)
                end if
             end do
          end do
       end associate
    end subroutine held_stiffness
 
-   !> A spring between two signed dofs, 0 for the ground.
-   pure subroutine add_spring(side_1, side_2, coefficient, stiffness)
-      integer, intent(in) :: side_1, side_2
+   !> A spring between two sides.
+   pure subroutine add_spring(rows, sides, coefficient, stiffness)
+      !> Of the model.
+      real(wp), allocatable, intent(in) :: rows(:, :)
+      integer, intent(in) :: sides(2)
       real(wp), intent(in) :: coefficient
       real(wp), intent(inout) :: stiffness(:, :)
-      integer :: dof(2), turn(2), a, b
+      integer, allocatable :: dof(:), other(:)
+      real(wp), allocatable :: turn(:), weight(:)
+      integer :: a, b
 
       ! coefficient b b^T, where b is +-1 at both dofs and the ground has no row.
-      dof = abs([side_1, side_2])
-      turn = [sign(1, side_1), -sign(1, side_2)]
-      do b = 1, 2
-         do a = 1, 2
-            if (dof(a) == 0 .or. dof(b) == 0) cycle
+      call terms_of(sides(1), dof, turn, rows)
+      call terms_of(-sides(2), other, weight, rows)
+      dof = [dof, other]
+      turn = [turn, weight]
+      do b = 1, size(dof)
+         do a = 1, size(dof)
             stiffness(dof(a), dof(b)) = stiffness(dof(a), dof(b)) + turn(a)*turn(b)*coefficient
          end do
       end do

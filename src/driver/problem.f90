@@ -12,6 +12,7 @@ module fw_problem
    use fw_fourier, only: fourier_type, new_fourier, fft_pays
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, method_tcm, &
       method_tcm_least_squares, parity_all, parity_odd, sampling_auto, sampling_events
+   use fw_held_bodies, only: pairs_of_bodies
    use fw_joint, only: joint_type, new_joint, turn_joint
    use fw_memory, only: require_memory
    use fw_moved_parameter, only: moved_parameter
@@ -195,6 +196,7 @@ contains
       call structure%at(stand, case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
       call new_balance_problem(joint, structure, fourier, laws, case%contact%depth, problem)
+      if (allocated(case%bodies)) call pairs_of_bodies(case, problem%body_of_pair)
       problem%origin = problem_origin(range=range, keeps_all=keeps_all, basis=basis, &
                                       borrows_laws=present(forces))
       problem%load_size = norm2([case%model%load_cosine, case%model%load_sine])

@@ -32,6 +32,12 @@ module fw_remark_table
       remark_kind('impact on mass', &
                   'law = ''rigid'' with a normal dof that has mass: not of high order '// &
                   'where it impacts'), &
+      remark_kind('self-locking', &
+                  'friction can jam a body that no spring holds: normal forces at rest '// &
+                  'have no upper bound, as of flanks with tan a <= mu'), &
+      remark_kind('body turns', &
+                  'normals leave a body that no spring holds a motion, which friction alone '// &
+                  'holds: a cylinder, or one point on each flank'), &
       ! What the program has chosen, and what it had to leave out.
       remark_kind('law chosen', &
                   'law was not given: ''rigid'' is taken, or ''dlft'' where something '// &

@@ -7,6 +7,7 @@ module fw_remarks
    use fw_joint_modes, only: held_stiffness, joint_mode_type, most_dofs, state_sliding
    use fw_kinds, only: pi, wp
    use fw_lapack, only: dpotrf
+   use fw_held_bodies, only: body_hold, find_hold
    use fw_harmonics_options, only: method_hbm, sampling_uniform
    use fw_law_text, only: law_text
    use fw_laws, only: facts_of, law_under_accuracy, law_words, is_of_high_order
@@ -15,6 +16,7 @@ module fw_remarks
    use fw_modes, only: mode_type
    use fw_result_group, only: group_writer, result_group
    use fw_sector_modes, only: find_sector_modes
+   use fw_side, only: terms_of
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_undetermined, only: undetermined_note
@@ -107,7 +109,38 @@ contains
       call remark_harmonics(case, remarks)
       call remark_law(case, remarks)
       call remark_tail(case, remarks)
+      call remark_bodies(case, remarks)
    end subroutine remark_input
+
+   !> Bodies that forces without a load can hold, or that normals leave a motion.
+   subroutine remark_bodies(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      type(body_hold) :: hold
+      type(string_type), allocatable :: numbers(:)
+      integer :: i, k
+
+      if (.not. allocated(case%bodies)) return
+      do i = 1, case%bodies%count()
+         call find_hold(case, i, hold)
+         if (hold%has_springs) cycle
+         associate (name => case%bodies%name(i)%text)
+            if (hold%locks_itself) call remarks%add('self-locking', 'body '//name//' can be '// &
+               'jammed: friction holds forces of its pairs without a load, and its normal '// &
+               'forces at rest have no upper bound')
+            if (hold%n_by_normals == hold%n_motions) cycle
+            allocate (numbers(0))
+            do k = 1, size(hold%touches)
+               if (hold%touches(k)) call append(numbers, to_text(k))
+            end do
+            call remarks%add('body turns', 'the normals of body '//name//' (pairs '// &
+               trim(list_of(numbers))//') hold '//to_text(hold%n_by_normals)//' of its '// &
+               to_text(hold%n_motions)//' motions: friction alone holds the others, and '// &
+               'nothing where all its pairs slip')
+            deallocate (numbers)
+         end associate
+      end do
+   end subroutine remark_bodies
 
    !> A load at rest that a wave meets has the order that the speed has to the frequency.
    subroutine remark_order(case, remarks)
@@ -266,7 +299,7 @@ contains
       type(remark_list), intent(inout) :: remarks
       type(law_facts) :: facts
       logical :: impacts
-      integer :: i, dof(2)
+      integer :: i
 
       associate (contact => case%contact)
          if (contact%n_pairs == 0) return
@@ -279,8 +312,8 @@ contains
          end if
          impacts = .false.
          do i = 1, contact%n_pairs
-            dof = abs([contact%side_1(3, i), contact%side_2(3, i)])
-            impacts = impacts .or. has_mass(case, dof(1)) .or. has_mass(case, dof(2))
+            impacts = impacts .or. has_mass(case, contact%side_1(3, i)) .or. &
+                      has_mass(case, contact%side_2(3, i))
          end do
          if (impacts) call remarks%add('impact on mass', 'a normal dof has mass: where it '// &
             'lifts off and lands, errors fall with 1/H only, as impacts of masses have a tail '// &
@@ -288,13 +321,16 @@ contains
       end associate
    end subroutine remark_tail
 
-   !> The ground, dof 0, has none.
-   pure logical function has_mass(case, dof)
+   !> Whether a side has any; the ground has none.
+   pure logical function has_mass(case, side)
       type(case_type), intent(in) :: case
-      integer, intent(in) :: dof
+      integer, intent(in) :: side
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
+      integer :: i
 
-      has_mass = .false.
-      if (dof > 0) has_mass = case%model%mass(dof, dof) > 0.0_wp
+      call terms_of(side, dof, weight, case%model%rows)
+      has_mass = any([(case%model%mass(dof(i), dof(i)) > 0.0_wp, i=1, size(dof))])
    end function has_mass
 
    !> A model that was reduced up to a frequency says nothing above it; modal damping of large

@@ -7,6 +7,7 @@ module fw_response
    use fw_error, only: error_type
    use fw_flow, only: flow_system, new_flow
    use fw_formulation, only: formulation_type
+   use fw_force_law, only: pair_open
    use fw_guess, only: free_guess, held_without_contact, stuck_guess
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_problem, only: balance_problem
@@ -115,6 +116,9 @@ module fw_response
    integer, parameter :: most_work = 20
    !> Pseudo-time as the solver of the case.
    integer, parameter :: own_solver = way_own + 1
+   !> Bodies that nothing but contact holds may turn freely where their pairs slip: steps of a trust
+   !> region do not run away with them.
+   integer, parameter :: by_trust_region = way_own + 2
    type(way_type), parameter :: flow_of_case = way_type('pseudo-time', own_solver, &
                                                         served_by_pseudo_time)
 
@@ -136,6 +140,8 @@ module fw_response
                up_to=flow_first_up_to, after_ripple=.false., is_costly=.true.), &
       way_type('smaller steps', way_steps, served_by_smaller_steps, as_first=.false., &
                after_ripple=.false., is_costly=.true.), &
+      way_type('Powell''s method', by_trust_region, served_by_powell, after_ripple=.false., &
+               is_costly=.true.), &
       way_type('guesses, with LU', way_guesses_by_lu, after_ripple=.false., is_last=.true.), &
       way_type('free guess', way_last_guess, served_by_free_guess, after_ripple=.false., &
                is_last=.true.)]
@@ -219,10 +225,41 @@ contains
       if (way%kind == way_own .or. way%word == few) then
          offers = self%flow_failures < max_flow_failures .and. &
                   .not. self%case%model%cyclic%is_cyclic
+      else if (way%kind == by_trust_region) then
+         offers = allocated(self%case%bodies) .and. self%kind /= solver_powell
       end if
    end function offers
 
-   !> Integrate in pseudo-time from the last solution, or from the stuck guess.
+   !> By Powell's method, from the last solution or the stuck guess, then from that without contact.
+   subroutine by_powell(self, walk, at, x, report, error)
+      class(response), intent(inout) :: self
+      type(walk_type), intent(inout) :: walk
+      type(position), intent(in) :: at
+      real(wp), intent(inout), contiguous :: x(:)
+      type(solver_report), intent(inout) :: report
+      type(error_type), allocatable, intent(out) :: error
+      integer :: kind, trial
+
+      call self%stand(at, error)
+      if (allocated(error)) return
+      kind = self%kind
+      self%kind = solver_powell
+      do trial = merge(1, 2, walk%known%kept > 0), 3
+         select case (trial)
+         case (1); x = walk%known%x(:, 1)
+         case (2); call stuck_guess(self%balance, x)
+         case default; call free_guess(self%balance, x)
+         end select
+         call self%solve(x, report, error)
+         if (allocated(error) .or. report%converged .or. report%interrupted) exit
+      end do
+      self%kind = kind
+      if (allocated(error)) return
+      if (report%converged) call walk%known%remember(at%along, x, at%level)
+   end subroutine by_powell
+
+   !> The ways of its own: pseudo-time from the last solution or from the stuck guess, and Powell's
+   !> method.
    subroutine by_flow(self, way, walk, at, x, report, error)
       class(response), intent(inout) :: self
       type(way_type), intent(in) :: way
@@ -234,6 +271,10 @@ contains
       type(pseudo_time_options) :: pseudo
       real(wp) :: start(size(x))
 
+      if (way%kind == by_trust_region) then
+         call by_powell(self, walk, at, x, report, error)
+         return
+      end if
       report = solver_report()
       call self%stand(at, error)
       if (allocated(error)) return
@@ -328,8 +369,27 @@ contains
          is_lasting = contact%all_periodic()
          if (system%problem%n_pairs == 0) return
          if (is_lasting .and. contact%all_open()) is_lasting = held_without_contact(system)
+         if (allocated(system%problem%body_of_pair)) is_lasting = is_lasting .and. &
+            .not. is_adrift(system%problem%body_of_pair, contact%state == pair_open)
       end associate
    end function is_lasting
+
+   !> Whether a body has lost all its pairs.
+   pure logical function is_adrift(body_of_pair, is_open)
+      !> Of a sector, and of all that are solved.
+      integer, intent(in) :: body_of_pair(:)
+      logical, intent(in) :: is_open(:)
+      integer :: b, j, n
+
+      is_adrift = .false.
+      n = size(body_of_pair)
+      do j = 0, size(is_open)/max(n, 1) - 1
+         do b = 1, maxval(body_of_pair)
+            if (.not. any(body_of_pair == b)) cycle
+            is_adrift = is_adrift .or. all(is_open(j*n + 1:(j + 1)*n) .or. body_of_pair /= b)
+         end do
+      end do
+   end function is_adrift
 
    !> Integrate in pseudo-time on the whole structure, at the frequency and from the guess of the
    !> condensed one.

@@ -7,7 +7,7 @@
 module fw_contact_keys
    use fw_contact_data, only: contact_type, spring_type, memory_words
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: above, at_least, dof_numbers, from_to
+   use fw_key_range, only: above, at_least, side_numbers, from_to
    use fw_kinds, only: wp
    use fw_laws, only: law_help, law_words, laws_of, new_law, pairs_of_law
    use fw_normal_law, only: normal_words, table, unilateral
@@ -111,10 +111,10 @@ contains
 
       call keys%bind(key('side_1', 'dofs of t1, t2, n on one side; 0: none, negative: with its '// &
                          'sign turned', &
-                         dof_numbers(), shape='3 x n_pairs', absent='of the file, else required'), &
-                     contact%side_1, needed)
+                         side_numbers(), shape='3 x n_pairs', &
+                         absent='of the file, else required'), contact%side_1, needed)
       call keys%bind(key('side_2', 'the same of the other side, 0: ground; the normal points '// &
-                         'from side 2 to side 1', dof_numbers(), shape='3 x n_pairs', &
+                         'from side 2 to side 1', side_numbers(), shape='3 x n_pairs', &
                          absent=of_file), contact%side_2, default=0)
       call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1: 1 is the '// &
                          'next, -1 the one before', shape='n_pairs', absent=of_file, &
@@ -270,9 +270,9 @@ contains
       logical :: needed
 
       needed = springs%n_springs > 0 .and. .not. allocated(springs%side_1)
-      call keys%bind(key('side_1', 'dof on one side', dof_numbers(), shape='n_springs', &
+      call keys%bind(key('side_1', 'dof on one side', side_numbers(), shape='n_springs', &
                          absent='of the file, else required'), springs%side_1, needed)
-      call keys%bind(key('side_2', 'dof on the other side, 0: ground', dof_numbers(), &
+      call keys%bind(key('side_2', 'dof on the other side, 0: ground', side_numbers(), &
                          shape='n_springs', absent=of_file), springs%side_2, default=0)
       call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1', &
                          shape='n_springs', absent=of_file, only='&cyclic'), &

@@ -8,7 +8,7 @@ module fw_damper_group
    use fw_fourier, only: fourier_type
    use fw_instant_law, only: element_motion, instant_law
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: at_least, at_most, dof_numbers, from_to, operator(.and.)
+   use fw_key_range, only: at_least, at_most, side_numbers, from_to, operator(.and.)
    use fw_kinds, only: wp
    use fw_text, only: to_text
    implicit none (type, external)
@@ -87,9 +87,9 @@ contains
       logical :: needed
 
       needed = self%n_given > 0 .and. .not. allocated(self%side_1)
-      call keys%bind(key('side_1', 'dof on one side', dof_numbers(), shape='n_dampers', &
+      call keys%bind(key('side_1', 'dof on one side', side_numbers(), shape='n_dampers', &
                          absent=or_needed), self%side_1, needed)
-      call keys%bind(key('side_2', 'dof on the other side, 0: ground', dof_numbers(), &
+      call keys%bind(key('side_2', 'dof on the other side, 0: ground', side_numbers(), &
                          shape='n_dampers', absent=of_file), self%side_2, default=0)
       call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1', &
                          shape='n_dampers', absent=of_file, only='&cyclic'), self%sector_2, &

@@ -6,7 +6,7 @@ module fw_polynomial_group
    use fw_element_group, only: element_group, group_name_length
    use fw_force_law, only: force_law
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: dof_numbers, from_to
+   use fw_key_range, only: side_numbers, from_to
    use fw_kinds, only: wp
    use fw_term_law, only: element_term, most_factors, new_terms
    use fw_text, only: to_text
@@ -86,13 +86,13 @@ contains
                               'forces are, or a force on one dof each', absent=of_file), &
                           self%of, of_words)
       call keys%bind(key('factors', 'signed dofs that a term is the product of, repeated for '// &
-                         'powers; 0: none', dof_numbers(), shape='8 x n_terms', repeats=.false., &
+                         'powers; 0: none', side_numbers(), shape='8 x n_terms', repeats=.false., &
                          absent=or_needed), self%factors, needed)
       call keys%bind(key('coefficient', 'of the terms; force = coefficient * product of the '// &
                          'factors, or that is a potential', shape='n_terms', repeats=.false., &
                          absent=or_needed), self%coefficient, needed)
       call keys%bind(key('dof', 'dof that the force of a term acts on, on the side of the '// &
-                         'stiffness', dof_numbers(), shape='n_terms', repeats=.false., &
+                         'stiffness', side_numbers(), shape='n_terms', repeats=.false., &
                          absent=or_needed, only="of = 'force'"), &
                      self%dof, self%n_given > 0 .and. self%of == of_force .and. &
                      .not. allocated(self%dof))

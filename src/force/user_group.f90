@@ -11,7 +11,7 @@ module fw_user_group
    use fw_error, only: error_type, fatal_error, status_io, status_input
    use fw_force_law, only: force_law
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: above, at_least, dof_numbers, from_to
+   use fw_key_range, only: above, at_least, side_numbers, from_to
    use fw_kinds, only: wp
    use fw_shared_library, only: find_address, find_function, open_library, why_not
    use fw_text, only: string_type, to_text
@@ -108,10 +108,10 @@ contains
       call keys%bind(key('n_in', 'displacements that each element takes', &
                          from_to(1, most_inputs)), self%inputs)
       call keys%set_size('n_in', self%inputs)
-      call keys%bind(key('side_1', 'dofs of its inputs', dof_numbers(), &
+      call keys%bind(key('side_1', 'dofs of its inputs', side_numbers(), &
                          shape='n_in x n_elements', repeats=.false., &
                          absent='required with n_elements'), self%side_1, needed)
-      call keys%bind(key('side_2', 'dofs on the other side, 0: ground', dof_numbers(), &
+      call keys%bind(key('side_2', 'dofs on the other side, 0: ground', side_numbers(), &
                          shape='n_in x n_elements', repeats=.false.), self%side_2, default=0)
       call keys%bind(key('n_parameters', 'constants that each function gets', from_to(0, most)), &
                      self%n_parameters)

@@ -5,6 +5,7 @@
 module fw_combinations
    use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_input
+   use fw_held_bodies, only: check_bodies
    use fw_kinds, only: wp
    use fw_memory, only: require_memory
    use fw_parameter_checks, only: check_parameter_sweep
@@ -35,6 +36,7 @@ contains
       if (.not. allocated(error)) call require_sectors(case, error)
       if (.not. allocated(error)) call check_order(case, error)
       if (.not. allocated(error)) call check_friction(case, error)
+      if (.not. allocated(error)) call check_bodies(case, error)
    end subroutine check_combinations
 
    !> A load of a harmonic that is left out would not act.

@@ -12,7 +12,7 @@ module fw_parameter_checks
    use fw_normal_law, only: curved_pairs, exponential, pairs_with, power, table
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_elements, &
+   use fw_parameters, only: body_mass, friction_coefficient, gap, harmonic_scale, is_of_elements, &
       is_of_matrices, is_of_sectors, is_per_pair, is_per_spring, mistuning_scale, mu_dynamic, &
       normal_coefficient, normal_load, normal_stiffness, not_negative, of_closing, of_pressed, &
       of_sliding, parameter_group, parameter_key, parameter_words, parameters, positive, &
@@ -148,6 +148,10 @@ contains
                   'it yet: run value by value'
       else if (case%model%cyclic%is_cyclic) then
          reason = 'matrices of a cyclic structure (&cyclic) are not served yet'
+      else if (number == body_mass .and. .not. allocated(case%bodies)) then
+         reason = 'the model has no bodies (/body): make it with fretwear.damper'
+      else if (number == body_mass .and. .not. are_alike(case)) then
+         reason = 'the bodies of the model have several masses: give all the same by &body mass'
       else if (number == rotation_speed .and. .not. case%model%rotates) then
          reason = 'the model has no stiffness_rotation and no load static_rotation'
       else if (number == rotation_speed .and. case%contact%has_growth()) then
@@ -155,6 +159,13 @@ contains
                   'value by value'
       end if
    end subroutine check_of_matrices
+
+   !> Whether one mass is that of all bodies.
+   pure logical function are_alike(case)
+      type(case_type), intent(in) :: case
+
+      are_alike = all(abs(case%bodies%mass - case%bodies%mass(1)) <= 0.0_wp)
+   end function are_alike
 
    !> What no sector differs by, and what goes from blade to blade.
    subroutine check_of_sectors(case, number, asked_by, reason)

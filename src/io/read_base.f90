@@ -48,6 +48,8 @@ contains
             return
          end if
          call check_dofs(reader, raw%order(), base%dof)
+         if (allocated(raw%rows)) call reader%refuse('base', 'dof', 'does not go with '// &
+            'model%row, whose dofs may move as supports do in part: use direction, or n_rows = 0')
          if (reader%failed()) return
          allocate (base%carried(raw%order()), source=0.0_wp)
          base%carried(abs(base%dof)) = real(sign(1, base%dof), wp)

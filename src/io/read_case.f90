@@ -506,6 +506,7 @@ contains
          'the case (dof, or direction beside coriolis): parameters that change these do not go '// &
          'with it; use direction without coriolis, or load%harmonic_scale')
       call finish_model(reader, options, raw, terms, case%model, case%origin, error, wanted)
+      if (raw%bodies%count() > 0) case%bodies = raw%bodies
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)
          if (allocated(raw%title)) case%title = raw%title

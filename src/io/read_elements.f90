@@ -39,7 +39,7 @@ contains
          if (allocated(error)) return
       end do
       if (.not. present(laws)) return
-      if (.not. reader%failed()) call check_dofs(laws, reader%extents('n_dof'), error)
+      if (.not. reader%failed()) call check_dofs(laws, reader%extents('(n_dof+n_rows)'), error)
       if (.not. (allocated(error) .or. reader%failed())) call elements%add_laws(laws)
    end subroutine read_elements
 

@@ -4,6 +4,7 @@
 !> The source is chosen first, because it decides which other keys may be given. `raw` collects the
 !> parts from whatever source; finish_model checks them and adds rotation and damping.
 module fw_read_model
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_cyclic_data, only: cyclic_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
@@ -15,8 +16,9 @@ module fw_read_model
    use fw_model_file, only: read_model_hdf5
    use fw_raw_model, only: raw_model
    use fw_model_forming, only: finish_structure, form_matrices, goes_alone, model_origin
-   use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads, bind_table, &
-      source_words, source_inline, source_hdf5, source_matrix_market, source_memory
+   use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_n_rows, bind_rows, &
+      bind_loads, bind_table, source_words, source_inline, source_hdf5, source_matrix_market, &
+      source_memory
    use fw_paths, only: resolve_path
    use fw_read_base, only: check_supports, read_motion => read_base
    use fw_read_nodal, only: finish_nodal
@@ -29,6 +31,9 @@ module fw_read_model
    private
 
    public :: read_model, read_loads, read_motion, finish_model, find_unit_system, stand_alone
+
+   !> Rows are divided by their largest weight.
+   real(wp), parameter :: least_weight = 1.0e-100_wp
 
    !> HDF5 can crash over a damaged file: reading is tried in a process of its own first.
    type, extends(trial_type) :: model_trial
@@ -75,10 +80,88 @@ contains
                             "'hdf5' or 'matrix_market', or remove file")
       end if
       call take_unit_system(reader, options, raw)
+      if (.not. allocated(raw%bodies)) allocate (raw%bodies)
       call read_matrices(reader, is_inline, n_dof, raw, needed=is_inline .and. &
                          .not. allocated(options%file))
+      call read_rows(reader, n_dof, raw)
       call options%bind_additions(reader)
+      call read_bodies(reader, n_dof, raw)
    end subroutine read_model
+
+   !> Bodies that no spring holds join the mass and the load of the rotation.
+   subroutine read_bodies(reader, n_dof, raw)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_dof
+      type(raw_model), intent(inout) :: raw
+      character(100) :: fault
+
+      if (raw%bodies%count() == 0 .and. reader%given('body', 'mass')) then
+         call reader%refuse('body', 'mass', 'is given, but the model has no bodies (/body): '// &
+                            'remove it, or make the model with fretwear.damper')
+      end if
+      call raw%bodies%bind_keys(reader)
+      if (reader%failed() .or. raw%bodies%count() == 0) return
+      call raw%bodies%find_fault(n_dof, fault)
+      if (len_trim(fault) > 0) then
+         call reader%refuse_model(trim(fault))
+         return
+      end if
+      ! Matrices of nodal diameters take them one by one.
+      if (allocated(raw%mass)) call raw%bodies%join(n_dof, raw%mass, raw%growth%load)
+   end subroutine read_bodies
+
+   !> Displacements that are combinations of dofs, on top of those of a file.
+   subroutine read_rows(reader, n_dof, raw)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_dof
+      type(raw_model), intent(inout) :: raw
+      integer :: n, n_file, r
+
+      n_file = 0
+      if (allocated(raw%rows)) n_file = size(raw%rows, 2)
+      n = n_file
+      call bind_n_rows(reader, n_dof, n)
+      if (reader%given('model', 'row') .and. .not. reader%given('model', 'n_rows')) then
+         call reader%refuse('model', 'n_rows', 'is missing: must be the number of rows')
+      end if
+      ! Other rows than those of the file.
+      if (n /= n_file .and. allocated(raw%rows)) deallocate (raw%rows)
+      call bind_rows(reader, n > 0 .and. .not. allocated(raw%rows), raw%rows)
+      if (reader%failed() .or. .not. allocated(raw%rows)) return
+      if (n == 0) then
+         deallocate (raw%rows)
+         return
+      end if
+      if (size(raw%rows, 1) /= n_dof) then
+         call reader%refuse_model('a row/matrix with rows of '//to_text(size(raw%rows, 1))// &
+                                  ' dofs: must be '//to_text(n_dof))
+         return
+      end if
+      do r = 1, n
+         if (.not. all(ieee_is_finite(raw%rows(:, r)))) then
+            call refuse_row('has a weight that is not finite: must be numbers')
+         else if (maxval(abs(raw%rows(:, r))) < least_weight) then
+            call refuse_row('has no weight: must not be zero')
+         else
+            cycle
+         end if
+         return
+      end do
+
+   contains
+
+      !> Where it was given.
+      subroutine refuse_row(message)
+         character(*), intent(in) :: message
+
+         if (reader%given('model', 'row')) then
+            call reader%refuse('model', 'row', 'of number '//to_text(r)//' '//message)
+         else
+            call reader%refuse_model('a row/matrix whose row '//to_text(r)//' '//message)
+         end if
+      end subroutine refuse_row
+
+   end subroutine read_rows
 
    !> What the case says of the units, or the model; not both, where they differ.
    subroutine take_unit_system(reader, options, raw)
@@ -312,6 +395,7 @@ contains
       real(wp) :: static(raw%order())
 
       if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
+      if (allocated(raw%rows)) model%rows = raw%rows
       if (options%speed_order > 0.0_wp) call check_speed_order(reader, options, raw, model)
       call take_whirl(reader, options, raw, model)
       call gather_waves(reader, raw, terms, model%cyclic, size(static), model%waves, &

@@ -127,7 +127,7 @@ contains
             nodal%stiffness = nodal%stiffness + options%rotation_speed**2* &
                               hermitian(parts%stiffness_rotation)
          else if (.not. (allocated(raw%load_static_rotation) .or. allocated(parts%coriolis) .or. &
-                         allocated(parts%load_static_rotation))) then
+                         allocated(parts%load_static_rotation) .or. raw%bodies%count() > 0)) then
             call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
                                'stiffness_rotation: remove it')
          end if
@@ -144,8 +144,27 @@ contains
                          options%rayleigh_stiffness*nodal%stiffness
       end if
       call take_loads(reader, options, raw, parts, nodal)
+      call join_bodies(options, raw, nodal)
       if (options%modal_damping > 0.0_wp) call damp_modes(options%modal_damping, nodal, error)
    end subroutine put_together
+
+   !> Bodies that no spring holds, among the displacements in front.
+   pure subroutine join_bodies(options, raw, nodal)
+      type(model_options), intent(in) :: options
+      type(raw_model), intent(in) :: raw
+      type(nodal_matrices), intent(inout) :: nodal
+      real(wp), allocatable :: mass(:, :), load(:, :)
+      integer :: n
+
+      if (raw%bodies%count() == 0) return
+      n = raw%cyclic%n_physical
+      call raw%bodies%join(n, mass, load)
+      nodal%mass(:n, :n) = nodal%mass(:n, :n) + mass
+      if (options%rayleigh_mass > 0.0_wp) nodal%damping(:n, :n) = nodal%damping(:n, :n) + &
+                                                                  options%rayleigh_mass*mass
+      nodal%load(:n, 1) = nodal%load(:n, 1) + options%static_scale*options%rotation_speed**2* &
+                          load(:, 1)
+   end subroutine join_bodies
 
    pure function hermitian(matrix) result(sound)
       complex(wp), intent(in) :: matrix(:, :)

@@ -11,6 +11,7 @@ module fw_read_output
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
+   use fw_side, only: add_side
    use fw_text, only: string_type, to_text
    use fw_text_list, only: name_sectors
    use fw_values, only: read_integer, quoted_text
@@ -51,6 +52,7 @@ contains
       integer :: i, most
 
       most = model%n_dof
+      if (allocated(model%rows)) most = most + size(model%rows, 2)
       if (allocated(raw%observe_name)) most = most + size(raw%observe_name)
       call bind_observed(reader, most, chosen, is_text)
       if (reader%failed()) return
@@ -63,7 +65,7 @@ contains
          allocate (model%observe_name(size(chosen)))
          allocate (chosen_rows(size(chosen), size(rows, 2)), source=0.0_wp)
          do i = 1, size(chosen)
-            call choose(reader, chosen(i)%text, is_text(i), names, rows, model%n_dof, &
+            call choose(reader, chosen(i)%text, is_text(i), names, rows, model, &
                         model%observe_name(i)%text, chosen_rows(i, :))
             call refuse_repeated(reader, model%observe_name(:i))
             if (reader%failed()) return
@@ -84,9 +86,9 @@ contains
       logical, allocatable, intent(out) :: is_text(:)
 
       call keys%bind_list(key('observe', 'which displacements are written; a dof number k is '// &
-                              'called uk', absent='all that the model file names, else every '// &
-                              'dof'), 'dof numbers or names of observed quantities', most, &
-                          chosen, is_text)
+                              'called uk, n_dof + k rowk', absent='all that the model file '// &
+                              'names, else every dof'), 'dof numbers or names of observed '// &
+                          'quantities', most, chosen, is_text)
    end subroutine bind_observed
 
    !> What the model file observes, or every dof.
@@ -120,17 +122,17 @@ contains
    end subroutine list_default
 
    !> One value of `observe`: a dof number, or a name.
-   subroutine choose(reader, value, is_text, names, rows, n_dof, name, row)
+   subroutine choose(reader, value, is_text, names, rows, model, name, row)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: value
       logical, intent(in) :: is_text
       type(string_type), intent(in) :: names(:)
       real(wp), intent(in) :: rows(:, :)
-      integer, intent(in) :: n_dof
+      type(model_type), intent(in) :: model
       character(:), allocatable, intent(out) :: name
       real(wp), intent(inout) :: row(:)
-      integer :: dof, i
-      logical :: is_number
+      integer :: dof, i, n_rows
+      logical :: is_number, is_row
 
       name = value
       ! Names first: a model file may name a quantity by a number.
@@ -139,14 +141,26 @@ contains
          row = rows(i, :)
          return
       end do
-      call read_integer(value, dof, is_number)
-      if (is_number .and. .not. is_text) then
+      n_rows = 0
+      if (allocated(model%rows)) n_rows = size(model%rows, 2)
+      is_row = .false.
+      if (index(value, 'row') == 1 .and. n_rows > 0) call read_integer(value(4:), dof, is_row)
+      if (is_row) is_row = dof >= 1 .and. dof <= n_rows
+      if (is_row) dof = model%n_dof + dof
+      is_number = .false.
+      if (.not. (is_row .or. is_text)) call read_integer(value, dof, is_number)
+      if (is_row .or. is_number) then
          name = 'u'//to_text(dof)
-         if (dof >= 1 .and. dof <= n_dof) then
-            row(dof) = 1.0_wp
+         if (dof > model%n_dof) name = 'row'//to_text(dof - model%n_dof)
+         if (dof >= 1 .and. dof <= model%n_dof + n_rows) then
+            call add_side(dof, 1.0_wp, row(:model%n_dof), model%rows)
+         else if (n_rows == 0) then
+            call reader%refuse('output', 'observe', '= '//to_text(dof)// &
+                               ': must be a dof from 1 to '//to_text(model%n_dof))
          else
             call reader%refuse('output', 'observe', '= '//to_text(dof)// &
-                               ': must be a dof from 1 to '//to_text(n_dof))
+                               ': must be a dof or a row, from 1 to '// &
+                               to_text(model%n_dof + n_rows))
          end if
       else
          call reader%refuse('output', 'observe', '= '//quoted_text(value)// &

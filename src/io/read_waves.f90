@@ -95,7 +95,7 @@ contains
          end do
       end if
       ! On top of what the model holds.
-      call terms%add_to(static, waves, columns)
+      call terms%add_to(static, waves, columns, raw%rows)
       if (terms%fundamental > 0) call check_orders(reader, raw, terms, cyclic)
 
    contains

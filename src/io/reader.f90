@@ -28,7 +28,7 @@ module fw_reader
    !> An extent of arrays.
    type :: size_type
       !> As shapes have it: n_dof, n_pairs, ..
-      character(12) :: name
+      character(16) :: name
       !> Number of elements along it.
       integer :: extent
       !> Values that may be given for as many elements after the other; 0 where only all may.

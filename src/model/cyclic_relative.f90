@@ -10,6 +10,7 @@ module fw_cyclic_relative
    use fw_relative, only: relative_type
    use fw_sector, only: sector_rows
    use fw_sector_relative, only: new_sector_relative, sector_relative
+   use fw_side, only: largest_weight
    implicit none (type, external)
    private
 
@@ -43,23 +44,29 @@ contains
 
    subroutine new_cyclic_relative(model, side_1, side_2, sector_2, self, others)
       type(model_type), intent(in) :: model
-      !> Signed dofs of the rows, 0 for the ground, and the sector of the second (n_rows).
+      !> Signed dofs and rows of the model, 0 for the ground, and the sector of the second (n_rows).
       integer, intent(in) :: side_1(:), side_2(:), sector_2(:)
       type(cyclic_relative), intent(out) :: self
       !> Rows of all dofs behind them (n_others, n_dof).
       real(wp), intent(in), optional :: others(:, :)
       complex(wp), allocatable :: rows(:, :)
+      real(wp), allocatable :: scale(:)
       logical, allocatable :: is_coordinate(:)
       integer :: k, r, step
 
       self%n_rows = size(side_1)
       if (present(others)) self%n_rows = self%n_rows + size(others, 1)
       allocate (is_coordinate(self%n_rows))
+      allocate (scale(self%n_rows), source=1.0_wp)
+      do r = 1, size(side_1)
+         scale(r) = max(largest_weight(side_1(r), model%rows), &
+                        largest_weight(side_2(r), model%rows))
+      end do
       associate (n => model%cyclic%n_sectors)
          allocate (self%at(n/2 + 1))
          do k = 0, n/2
             call sector_rows(model, k, side_1, side_2, sector_2, rows, others)
-            call new_sector_relative(rows, self%at(k + 1))
+            call new_sector_relative(rows, self%at(k + 1), scale)
          end do
          ! The wave has the multiples of gcd(N, EO), whatever its harmonics: numbers of coordinates
          ! do not depend on these.

@@ -7,9 +7,10 @@
 module fw_load_terms
    use fw_divisor, only: common_divisor
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: dof_numbers, from_to
+   use fw_key_range, only: side_numbers, from_to
    use fw_kinds, only: pi, wp
    use fw_load_waves, only: load_waves
+   use fw_side, only: add_side
    implicit none (type, external)
    private
 
@@ -46,8 +47,9 @@ contains
                          from_to(0, most_terms)), self%n_terms)
       call keys%set_size('n_terms', self%n_terms)
       needed = self%n_terms > 0
-      call keys%bind(key('term_dof', 'dof; negative: with its sign turned', dof_numbers(), &
-                         shape='n_terms', absent='required with n_terms'), self%dof, needed)
+      call keys%bind(key('term_dof', 'dof, or n_dof and a row; negative: with its sign '// &
+                         'turned', side_numbers(), shape='n_terms', &
+                         absent='required with n_terms'), self%dof, needed)
       call keys%bind(key('term_harmonic', 'harmonic, 0 to n_harmonics', &
                          from_to(0, most_harmonic), shape='n_terms', &
                          absent='1, or by term_order'), self%harmonic)
@@ -82,30 +84,32 @@ contains
    end subroutine take_orders
 
    !> Add the terms to the static load and to the waves.
-   pure subroutine add_to(self, static, waves, columns)
+   pure subroutine add_to(self, static, waves, columns, rows)
       class(load_terms), intent(in) :: self
       !> (n_dof).
       real(wp), intent(inout) :: static(:)
       type(load_waves), intent(inout) :: waves
       !> Cosine and sine parts of the waves (n_dof, 2 n_waves).
       real(wp), allocatable, intent(inout) :: columns(:, :)
+      !> Of the model, as in fw_side.
+      real(wp), intent(in), optional :: rows(:, :)
       real(wp) :: part(2)
-      integer :: i, w
+      integer :: i, k, w
 
       do i = 1, self%n_terms
-         associate (j => abs(self%dof(i)))
-            part = sign(1, self%dof(i))*self%amplitude(i)*turned(self%phase(i))
-            if (self%harmonic(i) == 0) then
-               static(j) = static(j) + part(1)
-               cycle
-            end if
-            w = waves%place(self%harmonic(i), self%power(i))
-            if (w == 0) then
-               call add_wave(self%harmonic(i), self%power(i), size(static), waves, columns)
-               w = waves%n_waves()
-            end if
-            columns(j, 2*w - 1:2*w) = columns(j, 2*w - 1:2*w) + part
-         end associate
+         part = self%amplitude(i)*turned(self%phase(i))
+         if (self%harmonic(i) == 0) then
+            call add_side(self%dof(i), part(1), static, rows)
+            cycle
+         end if
+         w = waves%place(self%harmonic(i), self%power(i))
+         if (w == 0) then
+            call add_wave(self%harmonic(i), self%power(i), size(static), waves, columns)
+            w = waves%n_waves()
+         end if
+         do k = 1, 2
+            call add_side(self%dof(i), part(k), columns(:, 2*w - 2 + k), rows)
+         end do
       end do
    end subroutine add_to
 

@@ -15,8 +15,9 @@ module fw_model
    type :: matrix_change
       !> Which parameter.
       integer :: parameter = 0
-      !> Of stiffness and damping (n_dof, n_dof), and of the static load (n_dof).
-      real(wp), allocatable :: stiffness(:, :), damping(:, :), load_static(:)
+      !> Of stiffness, damping and mass (n_dof, n_dof), and of the static load (n_dof); that of the
+      !> mass is not allocated where the parameter changes none.
+      real(wp), allocatable :: stiffness(:, :), damping(:, :), mass(:, :), load_static(:)
       !> The parameter in the case.
       real(wp) :: value = 0.0_wp
       !> Whether the change of the stiffness is one of hysteretic damping, i times it above harmonic
@@ -34,6 +35,9 @@ module fw_model
       !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
       real(wp), allocatable :: observe_matrix(:, :)
       type(string_type), allocatable :: observe_name(:)
+      !> Displacements that are combinations of dofs, which sides may name by numbers beyond n_dof
+      !> (n_dof, n_rows); not allocated where there are none.
+      real(wp), allocatable :: rows(:, :)
       !> Sectors around an axis, of which the matrices are one.
       type(cyclic_type) :: cyclic
       !> Names of the units, 'length-mass-time-force', for labels; not allocated if not known.

@@ -8,7 +8,7 @@ module fw_model_keys
 
    public :: model_options
    public :: source_words, source_inline, source_hdf5, source_matrix_market, source_memory
-   public :: bind_order, bind_matrices, bind_loads, bind_table
+   public :: bind_order, bind_matrices, bind_n_rows, bind_rows, bind_loads, bind_table
 
    character(*), parameter :: source_words(*) = &
       [character(13) :: 'inline', 'hdf5', 'matrix_market', 'memory']
@@ -112,6 +112,31 @@ contains
       call keys%bind(key('damping_unsymmetric', 'added to the damping as it is', unit='F s/L', &
                          shape=shape, repeats=.false., absent='0'), damping_unsymmetric)
    end subroutine bind_matrices
+
+   !> Displacements that are combinations of dofs: how many.
+   subroutine bind_n_rows(keys, n_dof, n_rows)
+      class(key_visitor), intent(inout) :: keys
+      integer, intent(in) :: n_dof
+      !> Of the model file on entry.
+      integer, intent(inout) :: n_rows
+
+      call keys%bind(key('n_rows', 'displacements that are combinations of dofs: sides, '// &
+                         'term_dof and observe name them by n_dof + 1, ..', from_to(0, largest), &
+                         absent='of the file'), n_rows)
+      call keys%set_size('n_rows', n_rows)
+      call keys%set_size('(n_dof+n_rows)', n_dof + n_rows)
+   end subroutine bind_n_rows
+
+   !> And what they are (n_dof, n_rows).
+   subroutine bind_rows(keys, needed, rows)
+      class(key_visitor), intent(inout) :: keys
+      logical, intent(in) :: needed
+      real(wp), allocatable, intent(inout) :: rows(:, :)
+
+      call keys%bind(key('row', 'weight of each dof in each of them, row after row', &
+                         shape='n_dof x n_rows', repeats=.false., &
+                         absent='of the file, else required with n_rows'), rows, needed)
+   end subroutine bind_rows
 
    !> What is added to the matrices once they are there, inline or from a file.
    subroutine bind_additions(self, keys)

@@ -12,7 +12,8 @@ module fw_parameters
    public :: harmonic_scale, static_scale, friction_coefficient, normal_load, gap, &
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
              rotation_speed, rayleigh_mass, rayleigh_stiffness, normal_coefficient, &
-             reference_force, loss_factor, slip_speed, mu_dynamic, blade_frequency, mistuning_scale
+             reference_force, loss_factor, slip_speed, mu_dynamic, blade_frequency, &
+             mistuning_scale, body_mass
    public :: of_sliding, of_closing, of_pressed, not_negative, positive
 
    integer, parameter :: harmonic_scale = 1, static_scale = 2, friction_coefficient = 3, &
@@ -23,6 +24,7 @@ module fw_parameters
                          slip_speed = 18, mu_dynamic = 19
    !> The first and the last of those in which sectors differ, in the order of fw_deviation.
    integer, parameter :: blade_frequency = 20, mistuning_scale = 24
+   integer, parameter :: body_mass = 25
 
    !> Where its values are: one of the loads, one for each pair or spring, one of the matrices, one
    !> for each of a group of other elements (its coefficient), one for each sector or for each row
@@ -73,7 +75,8 @@ module fw_parameters
       parameter_type('mistuning%damping_ratio', of_sectors), &
       parameter_type('mistuning%stiffness', of_sectors), &
       parameter_type('mistuning%mass', of_sectors), &
-      parameter_type('mistuning%scale', of_sectors)]
+      parameter_type('mistuning%scale', of_sectors), &
+      parameter_type('body%mass', of_matrices, positive)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word

@@ -48,6 +48,8 @@ module fw_reduction
       !> the internal modes (n, n, n_changes), and of the static load (n, n_changes); not allocated
       !> where none was asked for.
       real(wp), allocatable :: change_k(:, :, :), change_c(:, :, :), change_load(:, :)
+      !> The same of M, where one of them changes that.
+      real(wp), allocatable :: change_m(:, :, :)
       !> Whether that of K is one of hysteretic damping (n_changes).
       logical, allocatable :: change_loss(:)
    contains
@@ -223,6 +225,11 @@ contains
          self%change_k(:, :, k) = congruence(t, model%changes(k)%stiffness, t)
          self%change_c(:, :, k) = congruence(t, model%changes(k)%damping, t)
          self%change_load(:, k) = matmul(model%changes(k)%load_static, t)
+         if (.not. allocated(model%changes(k)%mass)) cycle
+         if (.not. allocated(self%change_m)) then
+            allocate (self%change_m(n, n, size(model%changes)), source=0.0_wp)
+         end if
+         self%change_m(:, :, k) = congruence(t, model%changes(k)%mass, t)
       end do
    end subroutine transform_changes
 

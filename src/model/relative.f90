@@ -1,4 +1,4 @@
-!> Relative coordinates: rows u(side_1) - u(side_2) of signed dof numbers, reduced to an
+!> Relative coordinates: rows u(side_1) - u(side_2) of dofs and rows of the model, reduced to an
 !> independent set q, and the change of variables u = T (q, eta) that carries it.
 !>
 !> Gauss-Jordan elimination keeps C and R with  u(pivot) = C q - R eta,  u(free) = eta, where the
@@ -7,6 +7,7 @@
 module fw_relative
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
+   use fw_side, only: add_side, largest_weight
    implicit none (type, external)
    private
 
@@ -33,18 +34,22 @@ module fw_relative
       procedure :: rows => rows_of_dofs
    end type relative_type
 
-   !> Entries below this are round-off of the elimination, which adds and subtracts +-1.
+   !> Entries below this are round-off of the elimination, which adds and subtracts +-1; of rows of
+   !> a model beside their largest weight.
    real(wp), parameter :: negligible = 1.0e-10_wp
 
 contains
 
    !> Build the coordinates of the given rows; a row with both sides 0 is refused by the caller.
-   subroutine new_relative(n_dof, side_1, side_2, self)
+   subroutine new_relative(n_dof, side_1, side_2, self, rows)
       integer, intent(in) :: n_dof
-      !> Signed dof numbers, 0 for ground (n_rows).
+      !> Signed numbers of dofs and rows, 0 for ground (n_rows).
       integer, intent(in) :: side_1(:), side_2(:)
       type(relative_type), intent(out) :: self
+      !> Rows of the model, as in fw_side.
+      real(wp), intent(in), optional :: rows(:, :)
       real(wp), allocatable :: echelon(:, :), row(:), combination(:)
+      real(wp) :: scale(size(side_1))
       integer :: r, m, n_rows, most
 
       n_rows = size(side_1)
@@ -55,35 +60,27 @@ contains
       allocate (self%c(most, most), source=0.0_wp)
       allocate (self%pivot(most), self%row_start(n_rows + 1), row(n_dof), combination(most))
       allocate (self%row_coordinate(0), self%row_weight(0), self%independent(n_rows))
+      scale = [(max(largest_weight(side_1(r), rows), largest_weight(side_2(r), rows)), &
+                r=1, n_rows)]
       m = 0
       self%row_start(1) = 1
       do r = 1, n_rows
          row = 0.0_wp
-         call add_side(row, side_1(r), 1.0_wp)
-         call add_side(row, side_2(r), -1.0_wp)
+         call add_side(side_1(r), 1.0_wp, row, rows)
+         call add_side(side_2(r), -1.0_wp, row, rows)
          call reduce(self, m, echelon, row, combination)
-         self%independent(r) = maxval(abs(row)) > negligible
+         self%independent(r) = maxval(abs(row)) > negligible*scale(r)
          if (self%independent(r)) then
             call append(self, m, echelon, row, combination)
             self%row_coordinate = [self%row_coordinate, m]
             self%row_weight = [self%row_weight, 1.0_wp]
          else
-            call express(self, m, combination)
+            call express(self, m, combination, negligible*scale(r)/maxval(scale))
          end if
          self%row_start(r + 1) = size(self%row_coordinate) + 1
       end do
       call finish(self, m, echelon)
    end subroutine new_relative
-
-   !> A signed dof with a sign: negative numbers are dofs that count the other way.
-   pure subroutine add_side(row, side, sign)
-      real(wp), intent(inout) :: row(:)
-      integer, intent(in) :: side
-      real(wp), intent(in) :: sign
-
-      if (side == 0) return
-      row(abs(side)) = row(abs(side)) + sign*real(merge(1, -1, side > 0), wp)
-   end subroutine add_side
 
    !> Subtract the echelon rows from a row; `combination` holds what was subtracted.
    subroutine reduce(self, m, echelon, row, combination)
@@ -132,16 +129,18 @@ contains
    end subroutine append
 
    !> Write a dependent row as a combination of the coordinates.
-   subroutine express(self, m, combination)
+   subroutine express(self, m, combination, least)
       type(relative_type), intent(inout) :: self
       integer, intent(in) :: m
       real(wp), intent(in) :: combination(:)
+      !> Weights up to this are round-off.
+      real(wp), intent(in) :: least
       real(wp) :: weight
       integer :: j
 
       do j = 1, m
          weight = dot_product(combination(:m), self%c(:m, j))
-         if (abs(weight) <= negligible) cycle
+         if (abs(weight) <= least) cycle
          self%row_coordinate = [self%row_coordinate, j]
          self%row_weight = [self%row_weight, weight]
       end do

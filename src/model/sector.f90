@@ -12,6 +12,7 @@ module fw_sector
    use fw_hermitian, only: complex_part, real_form
    use fw_kinds, only: wp
    use fw_model, only: model_type
+   use fw_side, only: terms_of
    implicit none (type, external)
    private
 
@@ -212,7 +213,7 @@ contains
    pure subroutine sector_rows(model, k, side_1, side_2, sector_2, rows, others)
       type(model_type), intent(in) :: model
       integer, intent(in) :: k
-      !> Signed dofs, 0 for the ground, and the sector of the second (n_rows).
+      !> Signed dofs and rows of the model, 0 for the ground, and the sector of the second (n_rows).
       integer, intent(in) :: side_1(:), side_2(:), sector_2(:)
       complex(wp), intent(out), allocatable :: rows(:, :)
       !> Rows of all dofs behind them (n_others, n_dof).
@@ -227,8 +228,8 @@ contains
       do r = 1, size(side_1)
          z = model%cyclic%factor(k, sector_2(r))
          associate (row => rows(r, :))
-            if (side_1(r) /= 0) call add_side(place, turn, side_1(r), (1.0_wp, 0.0_wp), row)
-            if (side_2(r) /= 0) call add_side(place, turn, side_2(r), -z, row)
+            call add_side(model, place, turn, side_1(r), (1.0_wp, 0.0_wp), row)
+            call add_side(model, place, turn, side_2(r), -z, row)
          end associate
       end do
       if (.not. present(others)) return
@@ -239,16 +240,23 @@ contains
       end do
    end subroutine sector_rows
 
-   pure subroutine add_side(place, turn, side, weight, row)
+   pure subroutine add_side(model, place, turn, side, factor, row)
+      type(model_type), intent(in) :: model
       integer, intent(in) :: place(:)
       complex(wp), intent(in) :: turn(:)
       integer, intent(in) :: side
-      complex(wp), intent(in) :: weight
+      complex(wp), intent(in) :: factor
       complex(wp), intent(inout) :: row(:)
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
+      integer :: j
 
-      associate (i => place(abs(side)))
-         row(i) = row(i) + sign(1, side)*weight*turn(abs(side))
-      end associate
+      call terms_of(side, dof, weight, model%rows)
+      do j = 1, size(dof)
+         associate (i => place(dof(j)))
+            row(i) = row(i) + weight(j)*factor*turn(dof(j))
+         end associate
+      end do
    end subroutine add_side
 
    !> stiffness + row^H coefficient row; the row holds the first coordinates.

@@ -18,19 +18,25 @@ module fw_sector_relative
       complex(wp), allocatable :: c(:, :), r(:, :)
    end type sector_relative
 
-   !> Entries below this are round-off of the elimination of rows with factors of magnitude one.
+   !> Entries below this are round-off of the elimination of rows with factors of magnitude one, and
+   !> of others beside their largest.
    real(wp), parameter :: negligible = 1.0e-10_wp
 
 contains
 
    !> Gauss-Jordan elimination of the rows in their order.
-   subroutine new_sector_relative(rows, self)
+   subroutine new_sector_relative(rows, self, largest)
       !> (n_rows, n).
       complex(wp), intent(in) :: rows(:, :)
       type(sector_relative), intent(out) :: self
+      !> The largest factors of their sides (n_rows), 1 without it.
+      real(wp), intent(in), optional :: largest(:)
+      real(wp) :: scale(size(rows, 1))
       complex(wp), allocatable :: echelon(:, :), row(:), combination(:)
       integer :: i, m, r, most
 
+      scale = 1.0_wp
+      if (present(largest)) scale = largest
       most = min(size(rows, 1), size(rows, 2))
       allocate (echelon(most, size(rows, 2)), self%c(most, most), source=(0.0_wp, 0.0_wp))
       allocate (self%weight(size(rows, 1), most), source=(0.0_wp, 0.0_wp))
@@ -45,13 +51,15 @@ contains
          do i = 1, m
             if (abs(combination(i)) > 0.0_wp) row = row - combination(i)*echelon(i, :)
          end do
-         if (maxval(abs(row)) > negligible) then
+         if (maxval(abs(row)) > negligible*scale(r)) then
             call append(self, m, echelon, row, combination)
             self%row(m) = r
             self%weight(r, m) = (1.0_wp, 0.0_wp)
          else
             self%weight(r, :m) = matmul(combination(:m), self%c(:m, :m))
-            where (abs(self%weight(r, :)) <= negligible) self%weight(r, :) = (0.0_wp, 0.0_wp)
+            where (abs(self%weight(r, :)) <= negligible*scale(r)/maxval(scale))
+               self%weight(r, :) = (0.0_wp, 0.0_wp)
+            end where
          end if
       end do
       call finish(self, m, echelon)

@@ -5,6 +5,8 @@ module fw_element_forces
    use fw_force_law, only: force_law, force_workspace
    use fw_instant_law, only: as_instant_law, element_motion, instant_law, reserve_motion
    use fw_kinds, only: wp
+   use fw_model, only: model_type
+   use fw_side, only: add_side
    implicit none (type, external)
    private
 
@@ -13,8 +15,7 @@ module fw_element_forces
    !> The elements of one kind.
    type :: forces_of_kind
       class(instant_law), allocatable :: law
-      !> Rows of B transposed, of the inputs of one element after the other (n_dof, inputs of all),
-      !> entries 0 and +-1.
+      !> Rows of B transposed, of the inputs of one element after the other (n_dof, inputs of all).
       real(wp), allocatable :: rows(:, :)
       !> What a unit force does to the accelerations: the same times the inverse of the mass, in
       !> the unit of whoever integrates.
@@ -38,9 +39,9 @@ module fw_element_forces
 contains
 
    !> The laws of the elements of a case; `kind` is empty where it has none.
-   subroutine new_element_forces(elements, n_dof, self)
+   subroutine new_element_forces(elements, model, self)
       type(element_list), intent(in) :: elements
-      integer, intent(in) :: n_dof
+      type(model_type), intent(in) :: model
       type(element_forces), intent(out) :: self
       class(force_law), allocatable :: law
       integer :: c, e, k, n
@@ -58,12 +59,12 @@ contains
             n = n + 1
             call group%make_law(1, law)
             call as_instant_law(law, self%kind(n)%law)
-            allocate (self%kind(n)%rows(n_dof, group%n_in*group%n_elements), source=0.0_wp)
+            allocate (self%kind(n)%rows(model%n_dof, group%n_in*group%n_elements), source=0.0_wp)
             do e = 1, group%n_elements
                do c = 1, group%n_in
                   associate (row => self%kind(n)%rows(:, (e - 1)*group%n_in + c))
-                     call add_side(group%row_side_1(c, e), 1.0_wp, row)
-                     call add_side(group%row_side_2(c, e), -1.0_wp, row)
+                     call add_side(group%row_side_1(c, e), 1.0_wp, row, model%rows)
+                     call add_side(group%row_side_2(c, e), -1.0_wp, row, model%rows)
                   end associate
                end do
             end do
@@ -72,16 +73,6 @@ contains
          end associate
       end do
    end subroutine new_element_forces
-
-   !> A signed dof; 0 is the ground, and does not move.
-   pure subroutine add_side(side, sign, row)
-      integer, intent(in) :: side
-      real(wp), intent(in) :: sign
-      real(wp), intent(inout) :: row(:)
-
-      if (side == 0) return
-      row(abs(side)) = row(abs(side)) + sign*real(merge(1, -1, side > 0), wp)
-   end subroutine add_side
 
    !> Take what the elements push with away from the accelerations.
    subroutine add(self, tau, omega, displacement, rate, acceleration)

@@ -19,6 +19,7 @@ module fw_time_structure
    use fw_load_waves, only: load_waves
    use fw_model, only: model_type
    use fw_pair_law, only: pair_law
+   use fw_side, only: add_side
    use fw_text, only: to_text
    implicit none (type, external)
    private
@@ -50,7 +51,7 @@ module fw_time_structure
       !> Loads in columns (n_dof, n_columns) [force], and what these are.
       real(wp), allocatable :: load(:, :)
       type(load_waves) :: waves
-      !> B transposed (n_dof, n_rows), entries 0 and +-1.
+      !> B transposed (n_dof, n_rows).
       real(wp), allocatable :: rows(:, :)
       !> Row of each component of each pair, 0 where it is absent (3, n_pairs).
       integer, allocatable :: row(:, :)
@@ -101,30 +102,33 @@ contains
       self%stiffness = model%stiffness
       self%load = model%load_columns()
       self%waves = model%waves
-      call take_pairs(contact, present, self)
+      call take_pairs(contact, present, model%rows, self)
       allocate (self%kind(0))
-      call take_elements(self, elements)
-      call take_springs(springs, self)
+      call take_elements(self, model, elements)
+      call take_springs(springs, model%rows, self)
       call find_massless(self, error)
       if (.not. allocated(error)) call check_rates(self, error)
    end subroutine new_time_structure
 
    !> What is neither pair nor spring.
-   subroutine take_elements(self, elements)
+   subroutine take_elements(self, model, elements)
       type(time_structure), intent(inout) :: self
+      type(model_type), intent(in) :: model
       type(element_list), intent(in), optional :: elements
 
       if (.not. present(elements)) return
       if (elements%n_elements() == 0) return
       allocate (self%elements)
-      call new_element_forces(elements, self%n_dof, self%elements)
-      call take_kinds(elements, self)
+      call new_element_forces(elements, model, self%elements)
+      call take_kinds(elements, model%rows, self)
    end subroutine take_elements
 
    !> Components that an elastic law gives no stiffness transmit nothing and are left out.
-   subroutine take_pairs(contact, present, self)
+   subroutine take_pairs(contact, present, rows, self)
       type(contact_type), intent(in) :: contact
       logical, intent(in) :: present(:, :)
+      !> Of the model.
+      real(wp), allocatable, intent(in) :: rows(:, :)
       type(time_structure), intent(inout) :: self
       integer :: i, c
 
@@ -154,15 +158,16 @@ contains
             end if
             self%n_rows = self%n_rows + 1
             self%row(c, i) = self%n_rows
-            call add_side(self, contact%side_1(c, i), 1.0_wp)
-            call add_side(self, contact%side_2(c, i), -1.0_wp)
+            call add_side(contact%side_1(c, i), 1.0_wp, self%rows(:, self%n_rows), rows)
+            call add_side(contact%side_2(c, i), -1.0_wp, self%rows(:, self%n_rows), rows)
          end do
       end do
    end subroutine take_pairs
 
    !> Rows of elements behind those of the pairs: their inputs.
-   subroutine take_kinds(elements, self)
+   subroutine take_kinds(elements, rows, self)
       type(element_list), intent(in) :: elements
+      real(wp), allocatable, intent(in) :: rows(:, :)
       type(time_structure), intent(inout) :: self
       type(element_rows) :: kind
       class(force_law), allocatable :: law
@@ -174,32 +179,34 @@ contains
          call as_instant_law(law, kind%law)
          if (.not. allocated(kind%law)) cycle
          kind%group = elements%slot(k)%group%name()
-         call take_inputs(elements%slot(k)%group, self, kind%row)
+         call take_inputs(elements%slot(k)%group, rows, self, kind%row)
          self%kind = [self%kind, kind]
       end do
    end subroutine take_kinds
 
    !> Rows of the inputs of a kind.
-   subroutine take_inputs(group, self, row)
+   subroutine take_inputs(group, rows, self, row)
       class(element_group), intent(in) :: group
+      !> Of the model.
+      real(wp), allocatable, intent(in) :: rows(:, :)
       type(time_structure), intent(inout) :: self
       integer, allocatable, intent(out) :: row(:, :)
-      real(wp), allocatable :: rows(:, :)
+      real(wp), allocatable :: longer(:, :)
       integer :: c, i, n
 
       n = group%n_in*group%n_elements
       allocate (row(group%n_in, group%n_elements), source=0)
-      allocate (rows(self%n_dof, size(self%rows, 2) + n), source=0.0_wp)
-      rows(:, :self%n_rows) = self%rows(:, :self%n_rows)
-      call move_alloc(rows, self%rows)
+      allocate (longer(self%n_dof, size(self%rows, 2) + n), source=0.0_wp)
+      longer(:, :self%n_rows) = self%rows(:, :self%n_rows)
+      call move_alloc(longer, self%rows)
       n = self%n_rows
       do i = 1, group%n_elements
          do c = 1, group%n_in
             if (group%row_side_1(c, i) == 0 .and. group%row_side_2(c, i) == 0) cycle
             self%n_rows = self%n_rows + 1
             row(c, i) = self%n_rows
-            call add_side(self, group%row_side_1(c, i), 1.0_wp)
-            call add_side(self, group%row_side_2(c, i), -1.0_wp)
+            call add_side(group%row_side_1(c, i), 1.0_wp, self%rows(:, self%n_rows), rows)
+            call add_side(group%row_side_2(c, i), -1.0_wp, self%rows(:, self%n_rows), rows)
          end do
       end do
       ! As a spring an element is its own law: nothing yields in series with it.
@@ -229,8 +236,9 @@ contains
    end subroutine check_rates
 
    !> Rows of springs behind those of pairs and elements: their elongations.
-   subroutine take_springs(springs, self)
+   subroutine take_springs(springs, rows, self)
       type(spring_type), intent(in) :: springs
+      real(wp), allocatable, intent(in) :: rows(:, :)
       type(time_structure), intent(inout) :: self
       integer :: i
 
@@ -239,26 +247,14 @@ contains
       self%compliance = [self%compliance(:self%n_rows), (0.0_wp, i=1, springs%n_springs)]
       do i = 1, springs%n_springs
          self%n_rows = self%n_rows + 1
-         call add_side(self, springs%side_1(i), 1.0_wp)
-         call add_side(self, springs%side_2(i), -1.0_wp)
+         call add_side(springs%side_1(i), 1.0_wp, self%rows(:, self%n_rows), rows)
+         call add_side(springs%side_2(i), -1.0_wp, self%rows(:, self%n_rows), rows)
       end do
       self%rows = self%rows(:, :self%n_rows)
       if (springs%n_springs == 0) return
       self%coefficient = springs%coefficient
       self%power = springs%power
    end subroutine take_springs
-
-   !> A signed dof; 0 is the ground, and does not move.
-   pure subroutine add_side(self, side, sign)
-      type(time_structure), intent(inout) :: self
-      integer, intent(in) :: side
-      real(wp), intent(in) :: sign
-
-      ! 0 is the ground; a negative number is the dof with its sign turned.
-      if (side == 0) return
-      self%rows(abs(side), self%n_rows) = self%rows(abs(side), self%n_rows) + &
-                                          sign*real(merge(1, -1, side > 0), wp)
-   end subroutine add_side
 
    !> Split the dofs by the eigenvectors of the mass scaled to a unit diagonal, so that mixed
    !> units do not decide what counts as massless.

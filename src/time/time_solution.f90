@@ -3,7 +3,7 @@
 module fw_time_solution
    use fw_interrupt, only: interrupt_type, stop_run
    use fw_kinds, only: wp
-   use fw_error, only: error_type, fatal_error, status_failure, status_input
+   use fw_error, only: error_type, fatal_error, status_failure
    use fw_motion, only: follow_motion, motion_type
    use fw_period_record, only: averaged_coefficients, largest_sample, period_record, &
       sampled_coefficients

@@ -64,7 +64,7 @@ def test_keys_of_all_groups_or_of_one(fw_run):
     one = fw_run("--keys", "solver").stdout
     assert one in everything.stdout and one.startswith("&solver ")
     assert "tolerance = a finite real above 0 and below 1 [1e-8]" in one
-    assert "side_1 = an integer within +-n_dof, one for all or 3 x n_pairs of them" in \
+    assert "side_1 = an integer within +-(n_dof+n_rows), one for all or 3 x n_pairs of them" in \
         everything.stdout
     assert "did you mean solver?" in fw_run.refused("--keys", "solvr", status=2)
     assert "json" in fw_run.refused("--keys=xml", status=2)

@@ -289,8 +289,8 @@ end module fw_toy_load
     toy.change("src/io/read_waves.f90",
                ("   use fw_text, only: to_text\n",
                 "   use fw_text, only: to_text\n   use fw_toy_load, only: add_swing\n"),
-               ("      call terms%add_to(static, waves, columns)\n",
-                "      call terms%add_to(static, waves, columns)\n"
+               ("      call terms%add_to(static, waves, columns, raw%rows)\n",
+                "      call terms%add_to(static, waves, columns, raw%rows)\n"
                 "      call add_swing(terms%swing, raw%mass, waves, columns)\n"))
 
 

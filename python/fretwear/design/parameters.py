@@ -14,6 +14,7 @@ from .._native import namelist_values
 from .._words import did_you_mean
 from ..case import Case
 from ..errors import InputError
+from ..model import Model
 
 __all__ = ["Bounds", "Unknowns", "bound_pairs", "case_values", "differentiated", "has_parts"]
 
@@ -29,6 +30,7 @@ _KEYS = {
     "contact%normal_stiffness": "contact/normal_stiffness",
     "spring%coefficient": "spring/coefficient", "model%modal_damping": "",
     "model%rayleigh_mass": "", "model%rayleigh_stiffness": "", "model%rotation_speed": "",
+    "body%mass": "",
 }
 _FORM = re.compile(r"([\w%]+)\s*(?:\(\s*(\d+)\s*(?::\s*(\d+)\s*)?\))?$")
 
@@ -190,12 +192,29 @@ def case_values(case: Case, keys: Sequence[str]) -> dict[str, Floats]:
     with case.open() as session:
         texts = namelist_values(session.text("namelist"))
         for key in keys:
-            found[key] = (session.part(_KEYS[key]) if _KEYS[key]
-                          else np.array([float(texts[key][0].lower().replace("d", "e"))]))
+            if key == "body%mass" and key not in texts:
+                found[key] = _masses(case, texts)
+            else:
+                found[key] = (session.part(_KEYS[key]) if _KEYS[key]
+                              else np.array([float(texts[key][0].lower().replace("d", "e"))]))
             if not len(found[key]):
                 what = "springs" if key.startswith("spring") else "contact pairs"
                 raise InputError(f"{key}: the case has no {what}")
     return found
+
+
+def _masses(case: Case, texts: Mapping[str, Sequence[str]]) -> Floats:
+    """The mass of the bodies of a model, which is that of all."""
+    model = case.model
+    if model is None and texts.get("model%source", [""])[0] == "hdf5":
+        model = Model.from_hdf5(texts["model%file"][0])
+    if model is None or model.bodies is None:
+        raise InputError("body%mass: the model has no bodies (fretwear.damper)")
+    masses = np.asarray(model.bodies.mass)
+    if np.ptp(masses) > 0.0:
+        raise InputError(f"body%mass: is not the same everywhere, {masses.min():.6g} to "
+                         f"{masses.max():.6g}; give all bodies one mass (&body mass)")
+    return masses[:1].copy()
 
 
 def differentiated(case: Case, keys: Sequence[str], quantities: Sequence[str]) -> Case:

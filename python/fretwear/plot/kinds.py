@@ -14,6 +14,7 @@ from .blades import plot_blades, plot_content
 from .campbell import plot_campbell_result
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
+from .dampers import has_bodies, plot_damper
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
 from .haigh import plot_haigh
@@ -112,6 +113,7 @@ KINDS: dict[str, Kind] = {
                        lambda r, c: plot_hysteresis(r, c.point, c.pairs)),
     "harmonics": Kind("Harmonics", lambda r: "coefficients" in r and r.n_points > 0,
                       lambda r, c: plot_harmonics(r, c.point, c.observe)),
+    "damper": Kind("A body between blades", has_bodies, lambda r, c: plot_damper(r, c.point)),
     "flanks": Kind("Contact on the flanks", _has("contact/position", "contact/fraction"),
                    lambda r, c: plot_flanks(r, c.point)),
     "wear_maps": Kind("Wear on the flanks", _has("contact/position", "wear/depth"),
