@@ -38,7 +38,7 @@ contains
    !> A new session.
    integer function new_handle(id) result(status)
       integer, intent(out) :: id
-      type(handle_type), pointer :: handle
+      class(handle_type), pointer :: handle
       integer :: i, problem
 
       id = 0
@@ -81,7 +81,7 @@ contains
    !> Give a session up; refused while a call is at work on it.
    integer function delete_handle(id) result(status)
       integer, intent(in) :: id
-      type(handle_type), pointer :: handle
+      class(handle_type), pointer :: handle
       integer :: i
 
       nullify (handle)

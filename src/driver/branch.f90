@@ -2,22 +2,19 @@
 module fw_branch
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
-   use fw_bifurcation, only: bifurcation_list
-   use fw_branch_fold, only: described_fold
-   use fw_branch_peaks, only: branch_peaks, branch_segment
+   use fw_branch_peaks, only: branch_peaks
    use fw_branch_step, only: interpolate
    use fw_case, only: case_type
    use fw_continuation, only: arclength_type, branch_point
    use fw_crossing_search, only: probe_type, search_crossings
+   use fw_curve_source, only: curve_source
    use fw_cycle_recovery, only: recover_cycle
-   use fw_describe, only: describer
    use fw_error, only: error_type
    use fw_formulation, only: formulation_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_newton, only: newton_solver, solver_report, tight_forcing
    use fw_observer, only: observer_type
-   use fw_parameter_system, only: parameter_system
    use fw_point, only: point_type, served_by_arclength
    use fw_level, only: level_type
    use fw_problem, only: build_system
@@ -29,14 +26,11 @@ module fw_branch
    use fw_strategy, only: new_request, note_time_limit, point_request
    use fw_remarks, only: is_undamped
    use fw_response_view, only: response_view
-   use fw_sweep, only: path_ends, point_source
    implicit none (type, external)
    private
 
    public :: branch_source
 
-   !> First step where n_points leaves the choice: this part of the interval.
-   integer, parameter :: default_steps = 100
    !> Way back of the frequency between two turns, relative, that harmonics and instants of a
    !> balance may make of a curve that does not turn: of forces with corners the harmonics that are
    !> left out fall as the power 2.5 of their number only.
@@ -45,139 +39,97 @@ module fw_branch
    integer, parameter :: whole_up_to = 150
 
    !> The points of a branch as points of a result, one after the other.
-   type :: branch_type
-      type(arclength_type) :: curve
+   type, extends(curve_source) :: branch_source
+      !> Solves the first point.
+      type(level_type), pointer :: level => null()
       type(balance_state), pointer :: system => null()
       !> The structure without condensation, where it is small: nothing of it is hidden from the
       !> step control then.
-      type(balance_problem), pointer :: whole_problem => null()
-      type(balance_state), pointer :: whole => null()
+      class(balance_problem), pointer :: whole_problem => null()
+      class(balance_state), pointer :: whole => null()
       !> What the curve is followed in.
-      type(formulation_type) :: formulation
-      class(parameter_system), pointer :: solved => null()
-      !> That of the level whose points come first.
-      type(describer), pointer :: about => null()
+      type(formulation_type), allocatable :: formulation
       !> What a condensed structure is measured by.
       type(response_view), pointer :: view => null()
       real(wp), allocatable :: r(:)
-      type(branch_peaks) :: peaks
-      !> Frequencies where it begins and ends, or values of the parameter that it goes along.
-      real(wp) :: ends(2) = 0.0_wp
+      type(branch_peaks), allocatable :: peaks
       !> The first row, and the last point of the curve.
-      type(point_type) :: first_row
-      type(branch_point), private :: before
+      type(point_type), allocatable :: first_row
+      type(branch_point), allocatable, private :: before
       !> The solution of the largest amplitude of the first observed quantity.
-      type(branch_point), private :: highest
+      type(branch_point), allocatable, private :: highest
       real(wp), private :: height = 0.0_wp
-      !> Where it turns and where its stability changes, and the solutions made to find out.
-      type(bifurcation_list) :: bifurcations
+      !> Solutions made to find out where its stability changes.
       integer :: n_solved = 0, iterations = 0
       !> The whole structure was small enough, and had no solution where the branch begins.
       logical :: is_condensed = .false.
-      type(multiplier_track), private :: track
+      type(multiplier_track), allocatable, private :: track
       !> The last point with multipliers, and distances to the folds behind it.
-      type(branch_point), private :: last
-      type(point_type), private :: last_point
+      type(branch_point), allocatable, private :: last
+      type(point_type), allocatable, private :: last_point
       real(wp), allocatable, private :: folds(:)
       !> Of its multipliers since the point before it.
       real(wp), private :: movement(2) = 0.0_wp
    contains
+      procedure :: build
       procedure :: begin
-      procedure :: next
-      procedure :: note
-      procedure :: point_along
-      procedure :: closing_words
+      procedure :: add
+      procedure :: finish
       procedure :: at_highest
       final :: release
-   end type branch_type
+   end type branch_source
 
-   !> Solutions between two points of a branch.
+   !> Solutions between two points of a branch: maxima, or changes of stability.
    type, extends(probe_type) :: branch_probe
-      type(branch_type), pointer :: branch => null()
+      type(branch_source), pointer :: branch => null()
       type(case_type), pointer :: case => null()
       type(branch_point) :: first, second
+      logical :: with_stability = .false.
    contains
       procedure :: at
    end type branch_probe
 
-   !> The same for maxima.
-   type, extends(branch_segment) :: peak_segment
-      type(branch_type), pointer :: branch => null()
-      type(case_type), pointer :: case => null()
-      type(branch_point) :: first, second
-   contains
-      procedure :: solve => solve_peak
-   end type peak_segment
-
-   !> The same as a source of a sweep.
-   type, extends(point_source) :: branch_source
-      type(branch_type) :: branch
-      !> Solves the first point.
-      type(level_type), pointer :: level => null()
-      logical :: has_begun = .false., has_no_start = .false.
-   contains
-      procedure :: next => next_on_branch
-      procedure :: is_covered
-      procedure :: finish
-   end type branch_source
-
 contains
 
+   !> Take a level that is built, which has to live as long.
+   subroutine build(self, level)
+      class(branch_source), intent(inout) :: self
+      type(level_type), intent(inout), target :: level
+
+      self%level => level
+      allocate (self%peaks, self%first_row, self%track)
+   end subroutine build
+
    !> The first point as in a natural sweep, then along the branch until a bound or max_points.
-   subroutine next_on_branch(self, case, observer, point, more, error)
+   subroutine begin(self, case, observer, point, more, error)
       class(branch_source), intent(inout), target :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
-      type(point_type), intent(out) :: point
+      type(point_type), intent(inout) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: x(:)
 
-      more = .not. (self%has_no_start .or. observer%is_stopping())
-      if (.not. more) return
-      if (.not. self%has_begun) then
-         call solve_first(self, case, observer, point, error)
-      else
-         call self%branch%next(case, point, more, error)
-      end if
-   end subroutine next_on_branch
-
-   subroutine solve_first(self, case, observer, point, error)
-      class(branch_source), intent(inout) :: self
-      type(case_type), intent(in) :: case
-      class(observer_type), intent(inout), target :: observer
-      type(point_type), intent(out) :: point
-      type(error_type), allocatable, intent(out) :: error
-
-      self%branch%ends = path_ends(case)
+      more = .true.
+      call self%set_out_on_path(case)
       ! What the first point leaves, the whole path inherits.
       self%level%solver%method%newton%loosest = tight_forcing
       call observer%limit_point(case%solver%max_seconds)
-      call self%level%solve(case, new_request(case, self%branch%ends(1), observer), point, error)
+      call self%level%solve(case, new_request(case, self%ends(1), observer), point, error)
       if (allocated(error)) return
       if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
       call observer%limit_point(0.0_wp)
       if (allocated(point%note)) call observer%on_message(point%note)
-      self%has_begun = .true.
-      self%has_no_start = .not. point%converged
-      if (point%converged) then
-         self%level%system%interrupt => observer
-         self%branch%about => self%level%solver%about
-         call self%branch%begin(case, self%level%system, self%level%solver%x, error)
-         if (.not. allocated(error)) call self%branch%point_along(case, self%branch%curve%here, &
-                                                                  point, error)
-         if (.not. allocated(error)) call self%branch%note(case, self%branch%curve%first, point, &
-                                                           error)
-      else
+      if (.not. point%converged) then
          call observer%on_message('the first point did not converge: no branch to follow')
+         return
       end if
-   end subroutine solve_first
-
-   !> A branch that never began has nothing left to follow.
-   pure logical function is_covered(self)
-      class(branch_source), intent(in) :: self
-
-      is_covered = self%has_no_start .or. self%branch%curve%complete
-   end function is_covered
+      self%level%system%interrupt => observer
+      x = self%level%solver%x
+      call begin_at(self, case, x, error)
+      if (.not. allocated(error)) call set_tangent(self, case, self%curve%here, point, error)
+      if (.not. allocated(error)) call note(self, case, self%curve%first, point, error)
+   end subroutine begin
 
    !> Why the branch ended, once it has; its work joins that of the first point.
    subroutine finish(self, case, observer)
@@ -186,59 +138,44 @@ contains
       class(observer_type), intent(inout) :: observer
       character(:), allocatable :: words
 
-      if (.not. self%has_begun .or. self%has_no_start) return
-      call self%level%solver%method%newton%linear%add_work(self%branch%curve%corrector%linear)
-      call self%branch%bifurcations%doubt(self%branch%track)
-      call self%branch%bifurcations%merge_turns( &
-         merge(ripple, smooth_ripple, case%contact%n_pairs > 0))
-      call self%branch%closing_words(case, observer%run_out, words)
+      if (.not. associated(self%solved)) return
+      call self%level%solver%method%newton%linear%add_work(self%curve%corrector%linear)
+      call self%bifurcations%doubt(self%track)
+      call self%bifurcations%merge_turns(merge(ripple, smooth_ripple, case%contact%n_pairs > 0))
+      call closing_words(self, case, observer%run_out, words)
       call observer%on_message(words)
    end subroutine finish
 
-   !> Start at a converged point x of the system at the start of the path, which counts as the
-   !> first of sweep%max_points. The system has to outlive the branch.
-   subroutine begin(self, case, system, x, error)
-      class(branch_type), intent(inout), target :: self
+   !> Start at a converged point x of the level at the start of the path.
+   subroutine begin_at(self, case, x, error)
+      class(branch_source), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(balance_state), intent(inout), target :: system
       real(wp), intent(in), contiguous :: x(:)
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: unknowns(:), whole_x(:)
 
-      self%system => system
-      call build_whole(self, case, system, x, whole_x, error)
+      self%system => self%level%system
+      call build_whole(self, case, self%level%system, x, whole_x, error)
       if (allocated(error)) return
       allocate (self%r(self%system%n))
-      associate (curve => self%curve)
-         curve%options = case%solver
-         curve%start = self%ends(1)
-         curve%finish = self%ends(2)
-         curve%max_points = case%sweep%max_points
-         curve%x_scale = displacement_scale(self%system)
-         ! Of a structure that is taken whole, too: a pair that sticks leaves no unknowns there.
-         if (.not. case%over%is_wanted()) then
-            call find_poles(system, curve)
-            ! Between its points a table of the load is straight.
-            if (allocated(case%model%waves%table_frequency)) curve%corner = &
-               case%model%waves%table_frequency
-         end if
-         curve%step = 1.0_wp/real(default_steps, wp)
-         if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
-      end associate
+      self%curve%x_scale = displacement_scale(self%system)
+      ! Of a structure that is taken whole, too: a pair that sticks leaves no unknowns there.
+      if (.not. case%over%is_wanted()) call find_poles(self%system, self%curve)
       if (.not. associated(self%whole)) allocate (self%view)
+      allocate (self%formulation)
       call self%formulation%begin(self%system)
-      self%solved => self%formulation%as_solved()
       allocate (unknowns(self%system%n))
       call self%formulation%from_coefficients(whole_x, unknowns)
       if (associated(self%view)) call self%view%begin(self%system, self%formulation)
       self%curve%corrector%view => self%view
-      call self%curve%begin(self%solved, unknowns, error)
-   end subroutine begin
+      self%solved => self%formulation%as_solved()
+      call self%follow(self%solved, unknowns, error)
+   end subroutine begin_at
 
    !> Where the structure is small, take it whole: resonances of what condensation leaves out would
    !> be passed over. The point it starts from is carried over.
    subroutine build_whole(self, case, system, x, whole_x, error)
-      class(branch_type), intent(inout) :: self
+      class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(balance_state), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
@@ -277,7 +214,7 @@ contains
    !> While all of the contact sticks, the structure vibrates with its relative coordinates held.
    pure subroutine find_poles(system, curve)
       type(balance_state), intent(in) :: system
-      type(arclength_type), intent(inout) :: curve
+      class(arclength_type), intent(inout) :: curve
       !> Half width of a mode without damping, over its frequency.
       real(wp), parameter :: least = 1.0e-4_wp
 
@@ -287,33 +224,34 @@ contains
 
    !> What was made for the view of the whole structure; the level goes with its strategy.
    subroutine release(self)
-      type(branch_type), intent(inout) :: self
+      type(branch_source), intent(inout) :: self
 
       if (associated(self%whole)) deallocate (self%whole)
       if (associated(self%whole_problem)) deallocate (self%whole_problem)
       if (associated(self%view)) deallocate (self%view)
    end subroutine release
 
-   !> The next point of the branch; `more` is false where there is none.
-   subroutine next(self, case, point, more, error)
-      class(branch_type), intent(inout) :: self
+   !> Every point of the curve is a row.
+   subroutine add(self, case, observer, found, point, more, error)
+      class(branch_source), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(point_type), intent(out) :: point
+      class(observer_type), intent(inout), target :: observer
+      type(branch_point), intent(in) :: found
+      type(point_type), intent(inout) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: found
 
-      call self%curve%next(self%solved, found, more, error)
-      if (allocated(error) .or. .not. more) return
+      associate (unused => observer)
+      end associate
+      more = .true.
       call describe(self, case, found, case%sweep%stability, point, error)
-      if (.not. allocated(error)) call self%note(case, found, point, error)
-      if (allocated(error)) return
-      call self%about%note_seconds(point)
-   end subroutine next
+      if (.not. allocated(error)) call note(self, case, found, point, error)
+      if (.not. allocated(error)) call self%level%solver%about%note_seconds(point)
+   end subroutine add
 
    !> A point has been reached: what lies between it and the last.
    subroutine note(self, case, found, point, error)
-      class(branch_type), intent(inout), target :: self
+      class(branch_source), intent(inout), target :: self
       type(case_type), intent(in), target :: case
       type(branch_point), intent(in) :: found
       type(point_type), intent(in) :: point
@@ -322,8 +260,7 @@ contains
       if (.not. case%over%is_wanted()) call note_peak(self, case, found, point, error)
       if (allocated(error)) return
       if (point%fold) then
-         ! One just beyond a bound belongs to no point of the sweep.
-         if (is_within(self, point%place)) call self%bifurcations%add(described_fold(found, point))
+         call self%note_fold(found, point)
          if (self%track%n > 0) then
             ! Counts of multipliers that pass 1 leave it out.
             self%folds = [self%folds, self%curve%corrector%metric%chord(self%last, found)]
@@ -344,50 +281,31 @@ contains
 
    !> The maxima between a point and the last.
    subroutine note_peak(self, case, found, point, error)
-      type(branch_type), intent(inout), target :: self
+      class(branch_source), intent(inout), target :: self
       type(case_type), intent(in), target :: case
       type(branch_point), intent(in) :: found
       type(point_type), intent(in) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(peak_segment) :: segment
+      type(branch_probe) :: probe
+      real(wp) :: length
 
-      if (allocated(self%before%x)) then
-         segment%branch => self
-         segment%case => case
-         segment%first = self%before
-         segment%second = found
-         segment%length = self%curve%corrector%metric%chord(self%before, found)
+      length = 0.0_wp
+      if (allocated(self%before)) then
+         probe%branch => self
+         probe%case => case
+         probe%first = self%before
+         probe%second = found
+         length = self%curve%corrector%metric%chord(self%before, found)
       else
          self%first_row = point
       end if
-      call self%peaks%add(point, segment, error)
+      call self%peaks%add(point, probe, length, error)
       self%before = found
    end subroutine note_peak
 
-   !> A point between the two that enclose a maximum, for who narrows it down.
-   subroutine solve_peak(self, share, point, error)
-      class(peak_segment), intent(inout) :: self
-      real(wp), intent(in) :: share
-      type(point_type), intent(out) :: point
-      type(error_type), allocatable, intent(out) :: error
-
-      call solve_between(self%branch, self%case, self%first, self%second, share, .false., point, &
-                         error)
-      self%n_solved = self%n_solved + 1
-      self%iterations = self%iterations + point%iterations
-   end subroutine solve_peak
-
-   !> Whether a place lies in the range of the sweep.
-   pure logical function is_within(self, place)
-      type(branch_type), intent(in) :: self
-      real(wp), intent(in) :: place
-
-      is_within = (place - self%ends(1))*(place - self%ends(2)) <= 0.0_wp
-   end function is_within
-
    !> Locate the changes of stability since the last point, the fold left out.
    subroutine look_between(self, case, found, point, error)
-      type(branch_type), intent(inout), target :: self
+      class(branch_source), intent(inout), target :: self
       type(case_type), intent(in), target :: case
       type(branch_point), intent(in) :: found
       type(point_type), intent(in) :: point
@@ -399,6 +317,7 @@ contains
       probe%first = self%last
       probe%second = found
       probe%folds = self%folds
+      probe%with_stability = case%sweep%stability
       call search_crossings(probe, self%last_point, point, self%movement, self%track%n - 1, &
                             .true., self%bifurcations, error)
       self%n_solved = self%n_solved + probe%n_solved
@@ -413,7 +332,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call solve_between(self%branch, self%case, self%first, self%second, share, &
-                         self%case%sweep%stability, point, error, self%reached)
+                         self%with_stability, point, error, self%reached)
       self%n_solved = self%n_solved + 1
       self%iterations = self%iterations + point%iterations
    end subroutine at
@@ -422,7 +341,7 @@ contains
    !> a frequency in between would not tell which part is meant.
    subroutine solve_between(self, case, first, second, share, with_stability, point, error, &
                             reached)
-      type(branch_type), intent(inout) :: self
+      class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(branch_point), intent(in) :: first, second
       real(wp), intent(in) :: share
@@ -430,7 +349,7 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       !> Distance from the first.
-      real(wp), intent(out), optional :: reached
+      real(wp), intent(out) :: reached
       type(branch_point) :: found
       real(wp) :: ds
 
@@ -438,7 +357,7 @@ contains
          ds = curve%corrector%metric%chord(first, second)
          call interpolate(curve%corrector%metric, first, second, share, found)
          call curve%corrector%correct(self%solved, first, ds, found, error)
-         if (present(reached)) reached = curve%corrector%metric%chord(first, found)
+         reached = curve%corrector%metric%chord(first, found)
       end associate
       if (allocated(error)) return
       if (found%report%converged) call describe(self, case, found, with_stability, point, error)
@@ -447,7 +366,7 @@ contains
 
    !> Why the branch ended, once it has.
    subroutine closing_words(self, case, out_of_time, words)
-      class(branch_type), intent(in) :: self
+      class(branch_source), intent(in) :: self
       type(case_type), intent(in) :: case
       !> Whether a limit of time stopped it.
       logical, intent(in) :: out_of_time
@@ -492,7 +411,7 @@ contains
 
    !> What is known of a point of the curve.
    subroutine describe(self, case, found, with_stability, point, error)
-      type(branch_type), intent(inout) :: self
+      class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(branch_point), intent(in) :: found
       logical, intent(in) :: with_stability
@@ -511,18 +430,20 @@ contains
       if (report%converged) report%converged = is_lasting(self%system) .and. .not. &
                                                lacks_friction(self%system, coefficients)
       point%fold = found%fold
-      call self%about%describe(case, request, case%harmonics%n_harmonics, self%system, &
-                               coefficients, report, served_by_arclength, point, error)
-      if (point%converged .and. is_within(self, found%p)) call note_height(self, found, point)
-      if (point%converged .and. request%sensitivity .and. .not. allocated(error)) then
-         call self%about%sensitivity%find(case, self%system, coefficients, point, error)
-      end if
-      if (.not. allocated(error)) call self%point_along(case, found, point, error)
+      associate (about => self%level%solver%about)
+         call about%describe(case, request, case%harmonics%n_harmonics, self%system, &
+                             coefficients, report, served_by_arclength, point, error)
+         if (point%converged .and. self%is_within(found%p)) call note_height(self, found, point)
+         if (point%converged .and. request%sensitivity .and. .not. allocated(error)) then
+            call about%sensitivity%find(case, self%system, coefficients, point, error)
+         end if
+      end associate
+      if (.not. allocated(error)) call set_tangent(self, case, found, point, error)
    end subroutine describe
 
    !> Evaluate the system at a point of the curve.
    subroutine stand_at(self, found, coefficients, error)
-      type(branch_type), intent(inout) :: self
+      class(branch_source), intent(inout) :: self
       type(branch_point), intent(in) :: found
       real(wp), allocatable, intent(out) :: coefficients(:)
       type(error_type), allocatable, intent(out) :: error
@@ -536,7 +457,7 @@ contains
 
    !> Keep the solution of the largest amplitude.
    pure subroutine note_height(self, found, point)
-      type(branch_type), intent(inout) :: self
+      class(branch_source), intent(inout) :: self
       type(branch_point), intent(in) :: found
       type(point_type), intent(in) :: point
 
@@ -549,13 +470,13 @@ contains
    !> That solution with one period of the pairs that dissipate most; not converged where there is
    !> none.
    subroutine at_highest(self, case, point, error)
-      class(branch_type), intent(inout) :: self
+      class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: coefficients(:)
 
-      if (.not. (allocated(self%highest%x) .and. case%output%contact)) return
+      if (.not. (allocated(self%highest) .and. case%output%contact)) return
       call stand_at(self, self%highest, coefficients, error)
       if (allocated(error)) return
       point%omega = self%system%frequency()
@@ -567,33 +488,25 @@ contains
 
    !> The direction of the branch at a point, by a difference along the tangent: observed
    !> quantities follow from unknowns and frequency, nothing is solved for.
-   subroutine point_along(self, case, found, point, error)
-      class(branch_type), intent(inout) :: self
+   subroutine set_tangent(self, case, found, point, error)
+      class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(branch_point), intent(in) :: found
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
-      !> Of the tangent, and what it may change of the frequency.
-      real(wp), parameter :: longest = 1.0e-4_wp, difference = 1.0e-7_wp
       real(wp), allocatable :: beside(:)
       real(wp) :: step, scale
 
       scale = abs(found%p)
-      if (case%over%is_wanted()) then
-         point%tangent_parameter = found%t_p
-         ! It may pass 0.
-         scale = max(scale, abs(self%ends(2) - self%ends(1)))
-      else
-         point%tangent_omega = found%t_p
-      end if
-      step = longest
-      if (abs(found%t_p)*step > difference*scale) step = difference*scale/abs(found%t_p)
+      ! A parameter may pass 0.
+      if (case%over%is_wanted()) scale = max(scale, abs(self%ends(2) - self%ends(1)))
+      call self%point_along(case, found, scale, point, step)
       call self%system%set_parameter(found%p + step*found%t_p, error)
       if (allocated(error)) return
       allocate (beside(size(found%x)))
       call self%formulation%to_coefficients(found%x + step*found%t, beside)
       call observed_coefficients(self%system, beside, case%harmonics%n_harmonics, point%tangent)
       point%tangent = (point%tangent - point%coefficients)/step
-   end subroutine point_along
+   end subroutine set_tangent
 
 end module fw_branch

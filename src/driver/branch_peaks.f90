@@ -2,6 +2,7 @@
 !> there, from its tangent: between one where it rises and the next where it falls lies a maximum,
 !> which is solved for on the branch.
 module fw_branch_peaks
+   use fw_crossing_search, only: probe_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_peak, only: found_bound, found_row, found_search, found_unresolved, peak_type
@@ -10,28 +11,7 @@ module fw_branch_peaks
    implicit none (type, external)
    private
 
-   public :: branch_peaks, branch_segment
-
-   !> The branch between its last two rows.
-   type, abstract :: branch_segment
-      !> Length of the step.
-      real(wp) :: length = 0.0_wp
-      !> Solutions made on it, and their iterations.
-      integer :: n_solved = 0, iterations = 0
-   contains
-      procedure(solve_between), deferred :: solve
-   end type branch_segment
-
-   abstract interface
-      !> The point at a share of the way, not converged where it is not found.
-      subroutine solve_between(self, share, point, error)
-         import :: branch_segment, point_type, error_type, wp
-         class(branch_segment), intent(inout) :: self
-         real(wp), intent(in) :: share
-         type(point_type), intent(out) :: point
-         type(error_type), allocatable, intent(out) :: error
-      end subroutine solve_between
-   end interface
+   public :: branch_peaks
 
    !> What is kept of a row: amplitudes and their derivatives along the branch (n_observed).
    type :: row_type
@@ -72,10 +52,12 @@ module fw_branch_peaks
 contains
 
    !> A row of the branch; maxima between it and the last are solved for.
-   subroutine add(self, point, segment, error)
+   subroutine add(self, point, probe, length, error)
       class(branch_peaks), intent(inout) :: self
       type(point_type), intent(in) :: point
-      class(branch_segment), intent(inout) :: segment
+      !> Gives points between the two, and how far they are apart.
+      class(probe_type), intent(inout) :: probe
+      real(wp), intent(in) :: length
       type(error_type), allocatable, intent(out) :: error
       type(row_type), allocatable :: longer(:)
       integer, parameter :: first_size = 64
@@ -110,7 +92,7 @@ contains
       do i = 1, size(point%amplitude)
          if (.not. (self%row(n - 1)%rise(i) > 0.0_wp .and. self%row(n)%rise(i) <= 0.0_wp)) cycle
          if (point%amplitude(i) <= negligible*maxval(point%amplitude)) cycle
-         call climb(self, point, segment, i, peak, error)
+         call climb(self, point, probe, length, i, peak, error)
          if (allocated(error)) return
          self%found = [self%found, peak]
          self%place = [self%place, n - 1]
@@ -118,8 +100,8 @@ contains
          self%first_found(i) = peak
       end do
       call follow_crest(self, point)
-      self%n_solved = self%n_solved + segment%n_solved
-      self%iterations = self%iterations + segment%iterations
+      self%n_solved = self%n_solved + probe%n_solved
+      self%iterations = self%iterations + probe%iterations
       self%last = point
    end subroutine add
 
@@ -201,10 +183,11 @@ contains
    end function rise_of
 
    !> Solve where the rise of quantity i vanishes between the last row and this one (Illinois).
-   subroutine climb(self, point, segment, i, peak, error)
+   subroutine climb(self, point, probe, length, i, peak, error)
       class(branch_peaks), intent(in) :: self
       type(point_type), intent(in) :: point
-      class(branch_segment), intent(inout) :: segment
+      class(probe_type), intent(inout) :: probe
+      real(wp), intent(in) :: length
       integer, intent(in) :: i
       type(peak_type), intent(out) :: peak
       type(error_type), allocatable, intent(out) :: error
@@ -226,7 +209,7 @@ contains
       end if
       do k = 1, most_trials
          share = (low*at_high - high*at_low)/(at_high - at_low)
-         call segment%solve(share, between, error)
+         call probe%at(share, between, error)
          if (allocated(error)) return
          if (.not. between%converged) return
          rise = rise_of(between)
@@ -252,7 +235,7 @@ contains
          real(wp), intent(in) :: rise
 
          gain_of = 0.0_wp
-         if (at_low > at_high) gain_of = 0.5_wp*rise**2*(high - low)*segment%length/ &
+         if (at_low > at_high) gain_of = 0.5_wp*rise**2*(high - low)*length/ &
                                          (at_low - at_high)
       end function gain_of
 

@@ -34,7 +34,7 @@ module fw_finer_wear
 
    type :: finer_wear
       !> The level with 2H+1 harmonics, at one address, and its wear.
-      type(level_type), pointer, private :: level => null()
+      class(level_type), pointer, private :: level => null()
       type(wear_system), private :: system
       type(wear_stepper), private :: stepper
       !> Modes of the structure that the case itself found.

@@ -7,6 +7,7 @@ module fw_frequency_response
    use fw_bifurcation, only: bifurcation_list
    use fw_bifurcation_group, only: bifurcation_group
    use fw_case, only: analyses, case_type
+   use fw_curve_source, only: curve_source
    use fw_error, only: error_type
    use fw_explanation, only: failure_list
    use fw_given_amplitude, only: given_amplitude
@@ -122,7 +123,7 @@ contains
       if (associated(run%kept)) call self%source%remember(run%kept%memory)
       select type (source => self%source)
       type is (branch_source)
-         if (source%branch%is_condensed) call remark_condensed(run%summary%remarks)
+         if (source%is_condensed) call remark_condensed(run%summary%remarks)
       end select
       associate (verdicts => run%summary%verdicts)
          call remark_stability(verdicts(verdict_undecided), sum(verdicts), run%summary%remarks)
@@ -230,9 +231,9 @@ contains
 
       select type (source => self%source)
       type is (branch_source)
-         call keep(source%branch%bifurcations, source%branch%n_solved, source%branch%iterations)
-      type is (vibration_branch)
-         call keep(source%folds, 0, 0)
+         call keep(source%bifurcations, source%n_solved, source%iterations)
+      class is (curve_source)
+         call keep(source%bifurcations, 0, 0)
       class default
          call keep(self%changes%found, self%changes%n_solved, self%changes%iterations)
       end select
@@ -287,12 +288,12 @@ contains
       associate (finder => self%finder, keeper => self%keeper, summary => run%summary)
          select type (source => self%source)
          type is (branch_source)
-            call source%branch%peaks%list(source%branch%first_row, peaks)
-            call source%branch%at_highest(case, highest, error)
+            call source%peaks%list(source%first_row, peaks)
+            call source%at_highest(case, highest, error)
             if (.not. allocated(error)) call keeper%take(highest, error)
             if (allocated(error)) return
-            call summary%describe_peaks(peaks, source%branch%peaks%n_solved, &
-                                        source%branch%peaks%iterations)
+            call summary%describe_peaks(peaks, source%peaks%n_solved, &
+                                        source%peaks%iterations)
          class default
             call finder%search(case, error)
             if (allocated(error)) return
@@ -340,7 +341,7 @@ contains
       integer, intent(out) :: n_points
       type(branch_source), allocatable :: branch
       type(list_source) :: list
-      type(vibration_branch) :: curve
+      type(vibration_branch), allocatable :: curve
       logical :: along_branch
 
       along_branch = .false.
@@ -348,8 +349,9 @@ contains
       select type (strategy)
       type is (walked_points)
          if (case%sweep%continuation == continuation_arclength) then
-            call curve%begin(case, strategy)
-            source = curve
+            allocate (curve)
+            call curve%build(case, strategy)
+            call move_alloc(curve, source)
             return
          end if
       type is (one_level)
@@ -360,7 +362,7 @@ contains
          if (along_branch) along_branch = is_shaken(case)
          if (along_branch) then
             allocate (branch)
-            branch%level => strategy%level
+            call branch%build(strategy%level)
          end if
       end select
       if (along_branch) then

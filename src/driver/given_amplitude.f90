@@ -592,7 +592,7 @@ contains
       class(given_amplitude), intent(inout) :: self
       real(wp), intent(in) :: level
       real(wp), intent(inout) :: x(:)
-      type(arclength_type), intent(inout) :: curve
+      class(arclength_type), intent(inout) :: curve
       real(wp) :: size_of_motion
       integer :: n
 

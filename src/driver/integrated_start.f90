@@ -49,7 +49,7 @@ contains
       !> Whether there is a motion at all, periodic or not.
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
-      type(time_strategy), allocatable :: integration
+      class(time_strategy), allocatable :: integration
       class(case_type), allocatable :: fast
       type(point_request) :: bare
       type(point_type) :: point

@@ -5,15 +5,15 @@
 !> over the largest depth, is to be within wear%error_tolerance, and tells how long the next one may
 !> be. Where it would be too short to pay, flights are flown in their order for a while.
 module fw_mission_flights
-   use fw_analysis, only: run_type
    use fw_block_march, only: block_type, mission_state
-   use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_mission_options, only: mission_options
    use fw_mission_rows, only: mission_rows
    use fw_point, only: point_type
    use fw_text, only: to_text
    use fw_wear_march, only: steady_gross_slip, steady_reached, wear_march
+   use fw_wear_options, only: wear_options
    implicit none (type, external)
    private
 
@@ -33,6 +33,8 @@ module fw_mission_flights
    real(wp), parameter :: unchanged = 1.0e-2_wp, bears = 1.0e-6_wp, wears = 1.0e-3_wp
 
    type :: mission_flights
+      type(mission_options), pointer :: mission => null()
+      type(wear_options), pointer :: wear => null()
       type(block_type), allocatable :: blocks(:)
       type(mission_rows) :: rows
       !> The control of the flights, where a march has that of its steps.
@@ -41,59 +43,37 @@ module fw_mission_flights
       !> Of the jump that has just ended; 0 within a flight.
       integer :: n_in_jump = 0
    contains
-      procedure :: build
       procedure :: fly_on
       procedure :: write_down
    end type mission_flights
 
 contains
 
-   !> Read and condense the blocks.
-   subroutine build(self, case, run, error)
-      class(mission_flights), intent(inout), target :: self
-      type(case_type), intent(in) :: case
-      type(run_type), intent(inout), target :: run
-      type(error_type), allocatable, intent(out) :: error
-      integer :: b
-
-      allocate (self%blocks(case%mission%n_blocks), self%over, self%now, self%rows%record)
-      self%rows%run => run
-      do b = 1, size(self%blocks)
-         call self%blocks(b)%build(case, b, run, error)
-         if (allocated(error)) return
-         self%rows%longest = max(self%rows%longest, self%blocks(b)%joint%balance%n)
-      end do
-      if (case%mission%keeps_order()) then
-         self%rows%n_expected = 1 + case%mission%n_blocks*case%mission%n_flights
-      end if
-   end subroutine build
-
    !> Flight after flight, or jump after jump.
-   subroutine fly_on(self, case, error)
+   subroutine fly_on(self, error)
       class(mission_flights), intent(inout), target :: self
-      type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
       integer :: n
       logical :: is_cut
 
-      associate (n_blocks => case%mission%n_blocks, now => self%now)
+      associate (n_blocks => self%mission%n_blocks, now => self%now)
          do
             ! Between two flights.
             if (now%block == 0 .or. now%block == n_blocks .or. self%n_in_jump > 0) then
-               call judge(self, case)
+               call judge(self)
                if (allocated(self%over%ending)) return
                now%block = 0
                self%n_in_jump = 0
             end if
-            n = wanted_flights(self, case)
+            n = wanted_flights(self)
             ! With more flights to go it would be another jump. The rest of a flight that is
             ! continued is none: its first rows have been written as they are.
-            is_cut = now%block == 0 .and. n < free_flights(self, case)
+            is_cut = now%block == 0 .and. n < free_flights(self)
             if (n > 1 .and. now%block == 0) then
-               call jump(self, case, n, is_cut, error)
+               call jump(self, n, is_cut, error)
             else
                if (now%block == 0) call wait_for_jump(self%over%next_cycles)
-               call fly_one(self, case, now%block + 1, .not. is_cut, error)
+               call fly_one(self, now%block + 1, .not. is_cut, error)
                if (is_cut .and. .not. allocated(error)) then
                   call self%write_down(.true., error)
                end if
@@ -104,12 +84,11 @@ contains
    end subroutine fly_on
 
    !> Flights of the next jump.
-   pure integer function wanted_flights(self, case) result(n)
+   pure integer function wanted_flights(self) result(n)
       type(mission_flights), intent(in) :: self
-      type(case_type), intent(in) :: case
 
-      n = min(free_flights(self, case), case%mission%n_flights - self%now%flight)
-      if (case%mission%flights_per_jump == 0 .and. n < least_jump) n = 1
+      n = min(free_flights(self), self%mission%n_flights - self%now%flight)
+      if (self%mission%flights_per_jump == 0 .and. n < least_jump) n = 1
    end function wanted_flights
 
    !> One flight less before the next jump.
@@ -122,18 +101,16 @@ contains
    end subroutine wait_for_jump
 
    !> The same without an end.
-   pure integer function free_flights(self, case) result(n)
+   pure integer function free_flights(self) result(n)
       type(mission_flights), intent(in) :: self
-      type(case_type), intent(in) :: case
 
       n = max(1, nint(self%over%next_cycles))
-      if (case%mission%flights_per_jump > 0) n = case%mission%flights_per_jump
+      if (self%mission%flights_per_jump > 0) n = self%mission%flights_per_jump
    end function free_flights
 
    !> A flight, from one of its blocks on; in the order of the blocks.
-   subroutine fly_one(self, case, first, writes, error)
+   subroutine fly_one(self, first, writes, error)
       type(mission_flights), intent(inout), target :: self
-      type(case_type), intent(in) :: case
       integer, intent(in) :: first
       !> Each row at once, not behind the jump that it belongs to.
       logical, intent(in) :: writes
@@ -141,44 +118,42 @@ contains
       integer :: b
 
       if (first == 1) self%now%flight = self%now%flight + 1
-      do b = first, case%mission%n_blocks
-         call wear_block(self, case, b, case%mission%cycles(b), 1.0_wp, writes, error)
+      do b = first, self%mission%n_blocks
+         call wear_block(self, b, self%mission%cycles(b), 1.0_wp, writes, error)
          if (allocated(error) .or. allocated(self%over%ending)) return
       end do
    end subroutine fly_one
 
    !> Several flights as one: the blocks to and fro. That they go to with more of their cycles than
    !> they come back is the order within one flight; of a single flight nothing comes back.
-   subroutine fly_together(self, case, n, error)
+   subroutine fly_together(self, n, error)
       type(mission_flights), intent(inout), target :: self
-      type(case_type), intent(in) :: case
       integer, intent(in) :: n
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: cycles, share
       integer :: b, k, last
 
       share = 1.0_wp
-      if (case%mission%flights_per_jump == 0) share = step_share
+      if (self%mission%flights_per_jump == 0) share = step_share
       if (n == 1) then
-         call fly_one(self, case, 1, .false., error)
+         call fly_one(self, 1, .false., error)
          return
       end if
       self%now%flight = self%now%flight + n
-      last = case%mission%n_blocks
+      last = self%mission%n_blocks
       do k = 1, 2*last - 1
          b = last - abs(last - k)
-         cycles = n*case%mission%cycles(b)
-         if (k < last) cycles = 0.5_wp*(n + 1)*case%mission%cycles(b)
-         if (k > last) cycles = 0.5_wp*(n - 1)*case%mission%cycles(b)
-         call wear_block(self, case, b, cycles, share, .false., error)
+         cycles = n*self%mission%cycles(b)
+         if (k < last) cycles = 0.5_wp*(n + 1)*self%mission%cycles(b)
+         if (k > last) cycles = 0.5_wp*(n - 1)*self%mission%cycles(b)
+         call wear_block(self, b, cycles, share, .false., error)
          if (allocated(error) .or. allocated(self%over%ending)) return
       end do
    end subroutine fly_together
 
    !> One march of a block, and its row. A block that fails names the ending.
-   subroutine wear_block(self, case, b, cycles, share, writes, error)
+   subroutine wear_block(self, b, cycles, share, writes, error)
       type(mission_flights), intent(inout), target :: self
-      type(case_type), intent(in) :: case
       integer, intent(in) :: b
       real(wp), intent(in) :: cycles
       !> Part of wear%error_tolerance that a step may be off.
@@ -191,7 +166,7 @@ contains
 
       associate (block => self%blocks(b), over => self%over)
          begun = self%now%cycles
-         call block%march(cycles, max(tightest, share*case%wear%tolerance()), self%now, point, &
+         call block%march(cycles, max(tightest, share*self%wear%tolerance()), self%now, point, &
                           stopped, error)
          self%rows%record%n_marches = self%rows%record%n_marches + 1
          if (allocated(error)) return
@@ -201,7 +176,7 @@ contains
          else if (allocated(block%failure)) then
             over%gave_up = .true.
             over%ending = 'flight '//to_text(self%now%flight)//', '// &
-                          trim(case%mission%title(b))//': '//block%failure
+                          trim(self%mission%title(b))//': '//block%failure
          end if
          if (allocated(over%ending)) return
          self%now%block = b
@@ -227,9 +202,8 @@ contains
    end subroutine count_steps
 
    !> A jump and the two of half its length, until they agree; the halves are taken.
-   subroutine jump(self, case, wanted, ends_early, error)
+   subroutine jump(self, wanted, ends_early, error)
       type(mission_flights), intent(inout), target :: self
-      type(case_type), intent(in) :: case
       !> Flights to begin with, and whether they would be more with more to come.
       integer, intent(in) :: wanted
       logical, intent(in) :: ends_early
@@ -241,7 +215,7 @@ contains
       logical :: by_error, is_cut
 
       before = self%now
-      by_error = case%mission%flights_per_jump == 0
+      by_error = self%mission%flights_per_jump == 0
       n = wanted
       is_cut = ends_early
       difference = 0.0_wp
@@ -253,12 +227,12 @@ contains
          if (n == 1 .or. (by_error .and. n < least_jump)) then
             ! No shorter one pays: the failure of a flight is that of the run.
             self%over%next_cycles = -real(patience, wp)
-            call fly_one(self, case, 1, .true., error)
+            call fly_one(self, 1, .true., error)
             return
          end if
          half = n
          if (by_error) then
-            call fly_together(self, case, n, error)
+            call fly_together(self, n, error)
             if (.not. (allocated(error) .or. allocated(self%over%ending))) then
                whole = self%now%depth
                call step_back(self, before, error)
@@ -267,10 +241,10 @@ contains
             end if
          end if
          if (.not. (allocated(error) .or. allocated(self%over%ending))) then
-            call fly_together(self, case, half, error)
+            call fly_together(self, half, error)
          end if
          if (half < n .and. .not. (allocated(error) .or. allocated(self%over%ending))) then
-            call fly_together(self, case, n - half, error)
+            call fly_together(self, n - half, error)
          end if
          if (allocated(error)) return
          if (allocated(self%over%ending)) then
@@ -282,10 +256,10 @@ contains
          else if (by_error) then
             difference = maxval(abs(self%now%depth - whole))
             factor = largest_growth
-            if (difference > 0.0_wp) factor = safety*(case%wear%tolerance()* &
+            if (difference > 0.0_wp) factor = safety*(self%wear%tolerance()* &
                maxval(self%now%depth)/difference)**(1.0_wp/3.0_wp)
             factor = min(largest_growth, max(smallest_shrink, factor))
-            if (difference <= case%wear%tolerance()*maxval(self%now%depth)) exit
+            if (difference <= self%wear%tolerance()*maxval(self%now%depth)) exit
             n = max(1, min(n - 1, int(factor*n)))
          else
             exit
@@ -319,9 +293,8 @@ contains
    end subroutine step_back
 
    !> Whether the mission ends between two flights, and why.
-   subroutine judge(self, case)
+   subroutine judge(self)
       type(mission_flights), intent(inout), target :: self
-      type(case_type), intent(in) :: case
       real(wp) :: growth(size(self%now%depth))
       integer :: before
 
@@ -330,7 +303,7 @@ contains
             before = findloc(record%solved(:now%flight - 1), .true., dim=1, back=.true.) - 1
             growth = (now%depth - record%depth(:, before))/(now%flight - before)
             over%largest_rate = max(over%largest_rate, maxval(growth))
-            if (maxval(growth) <= case%wear%steady_tolerance*over%largest_rate) then
+            if (maxval(growth) <= self%wear%steady_tolerance*over%largest_rate) then
                over%steady = steady_reached
                over%complete = .true.
                over%ending = 'steady state after '//to_text(now%flight)//' flights'
@@ -343,7 +316,7 @@ contains
                              'there is no steady state'
             end if
          end if
-         if (now%flight >= case%mission%n_flights .and. .not. allocated(over%ending)) then
+         if (now%flight >= self%mission%n_flights .and. .not. allocated(over%ending)) then
             over%complete = .true.
             over%ending = 'n_flights reached'
          end if

@@ -47,7 +47,7 @@ contains
       self%run => run
       self%case => case
       allocate (self%flights)
-      call self%flights%build(case, run, error)
+      call build_blocks(case, run, self%flights, error)
       if (allocated(error)) return
       patches%contact => case%contact
       patches%cycles_units = 'cycles'
@@ -58,6 +58,30 @@ contains
       if (allocated(error)) return
       call run%begin_points(case, self, self%flights%rows%n_expected)
    end subroutine start
+
+   !> Read and condense the blocks.
+   subroutine build_blocks(case, run, flights, error)
+      type(case_type), intent(in), target :: case
+      type(run_type), intent(inout), target :: run
+      type(mission_flights), intent(inout), target :: flights
+      type(error_type), allocatable, intent(out) :: error
+      integer :: b
+
+      flights%mission => case%mission
+      flights%wear => case%wear
+      associate (rows => flights%rows)
+         allocate (flights%blocks(case%mission%n_blocks), flights%over, flights%now, rows%record)
+         rows%run => run
+         do b = 1, size(flights%blocks)
+            call flights%blocks(b)%build(case, b, run, error)
+            if (allocated(error)) return
+            rows%longest = max(rows%longest, flights%blocks(b)%joint%balance%n)
+         end do
+         if (case%mission%keeps_order()) then
+            rows%n_expected = 1 + case%mission%n_blocks*case%mission%n_flights
+         end if
+      end associate
+   end subroutine build_blocks
 
    !> What would refuse a block.
    subroutine check_blocks(self, case, error)
@@ -85,14 +109,14 @@ contains
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
 
-      associate (unused => observer, unused_point => point)
+      associate (unused => observer, unused_case => case, unused_point => point)
       end associate
       more = .false.
       associate (flights => self%flights)
          if (allocated(flights%over%ending)) return
          call begin(self%case, self%run, flights, error)
          if (.not. (allocated(error) .or. allocated(flights%over%ending))) then
-            call flights%fly_on(case, error)
+            call flights%fly_on(error)
          end if
          call flights%rows%for_restart%close()
          self%falls_short = .not. flights%over%complete

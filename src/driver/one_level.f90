@@ -7,7 +7,7 @@ module fw_one_level
    use fw_level, only: level_type
    use fw_other_starts, only: start_elsewhere
    use fw_point, only: point_type
-      use fw_remarks, only: is_undamped, remark_undetermined
+   use fw_remarks, only: is_undamped, remark_undetermined
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
@@ -27,7 +27,7 @@ module fw_one_level
       type(level_type) :: level
       !> The last one with fewer harmonics that a point was started from: it goes along with the
       !> sweep where points fail.
-      type(level_type), pointer, private :: below => null()
+      class(level_type), pointer, private :: below => null()
       !> Points that other balances of the case led to, and what did so last.
       integer :: n_elsewhere = 0
       character(:), allocatable :: way

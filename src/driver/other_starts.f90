@@ -43,7 +43,7 @@ contains
       type(case_type), intent(in) :: case
       type(level_type), intent(inout), target :: level
       !> With fewer harmonics, of an earlier point that failed; not associated without one.
-      type(level_type), pointer, intent(inout) :: below
+      class(level_type), pointer, intent(inout) :: below
       type(point_request), intent(in) :: request
       !> Whether the point is worth more than a step of that one.
       logical, intent(in) :: everywhere
@@ -92,7 +92,7 @@ contains
    !> A step of the level with fewer harmonics, and from there.
    subroutine from_below(case, below, level, request, point, work, done, error)
       type(case_type), intent(in) :: case
-      type(level_type), pointer, intent(in) :: below
+      class(level_type), pointer, intent(in) :: below
       type(level_type), intent(inout), target :: level
       type(point_request), intent(in) :: request
       type(point_type), intent(inout) :: point
@@ -129,7 +129,7 @@ contains
       type(case_type), intent(in) :: case
       type(level_type), intent(inout), target :: level
       !> The last level with a solution takes its place.
-      type(level_type), pointer, intent(inout) :: below
+      class(level_type), pointer, intent(inout) :: below
       type(point_request), intent(in) :: request
       type(point_type), intent(inout) :: point
       integer, intent(inout) :: work
@@ -138,7 +138,7 @@ contains
       integer, intent(out) :: lower
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: ladder(:)
-      type(level_type), pointer :: last, next
+      class(level_type), pointer :: last, next
       integer :: most, upper, k
 
       nullify (last)
@@ -190,7 +190,7 @@ contains
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
       class(case_type), allocatable :: easier
-      type(level_type), pointer :: last, next
+      class(level_type), pointer :: last, next
       real(wp), allocatable :: scales(:)
       logical :: rigid
       integer :: k
@@ -227,7 +227,7 @@ contains
       type(case_type), intent(in) :: easier
       integer, intent(in) :: n_harmonics
       type(point_request), intent(in) :: request
-      type(level_type), pointer, intent(inout) :: last, next
+      class(level_type), pointer, intent(inout) :: last, next
       integer, intent(inout) :: work
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error

@@ -615,7 +615,7 @@ contains
       !> That is asked for, 0 where none is.
       real(wp), intent(in) :: level
       real(wp), intent(inout) :: x(:)
-      type(arclength_type), intent(inout) :: curve
+      class(arclength_type), intent(inout) :: curve
 
       associate (unused => self, unused_level => level, unused_x => x, unused_curve => curve)
       end associate

@@ -5,7 +5,8 @@ module fw_run_mode
    use fw_analysis, only: analysis, run_type
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of, coefficients_of
-   use fw_continuation, only: arclength_type, branch_point
+   use fw_continuation, only: branch_point
+   use fw_curve_source, only: curve_source
    use fw_describe, only: describer
    use fw_error, only: error_type
    use fw_kinds, only: wp
@@ -34,7 +35,8 @@ module fw_run_mode
       type(run_type), pointer :: run => null()
       type(mode_start) :: at_rest
       type(mode_path) :: path
-      type(arclength_type) :: branch
+      !> The source along a branch.
+      type(mode_curve), allocatable :: along
       type(mode_table) :: table
       type(cycle_finder) :: cycles
       type(describer) :: about
@@ -56,6 +58,15 @@ module fw_run_mode
       procedure :: next
       procedure :: conclude
    end type mode_analysis
+
+   !> The mode along its branch, through folds over the amplitude.
+   type, extends(curve_source) :: mode_curve
+      type(mode_analysis), pointer :: of => null()
+   contains
+      procedure :: begin => begin_branch
+      procedure :: add => add_branch_point
+      procedure :: close => close_branch
+   end type mode_curve
 
    !> Below this part of the stuck frequency nothing holds the motion any more.
    real(wp), parameter :: lost_frequency = 1.0e-3_wp
@@ -81,8 +92,13 @@ contains
       if (allocated(error)) return
       self%run => run
       call describe_start(self%at_rest, self%table)
-      call run%begin_points(case, self, merge(case%mode%n_points, 0, &
-                                              case%mode%continuation == continuation_natural))
+      if (case%mode%continuation == continuation_natural) then
+         call run%begin_points(case, self, case%mode%n_points)
+      else
+         allocate (self%along)
+         self%along%of => self
+         call run%begin_points(case, self%along, 0)
+      end if
       self%at_rest%system%interrupt => run%observer
       self%at_rest%balance%interrupt => run%observer
       allocate (self%y(self%at_rest%system%n))
@@ -90,8 +106,7 @@ contains
       call self%about%start_clock()
    end subroutine start
 
-   !> The first row, then along the curve; behind the last one limit cycles and the onset of slip
-   !> are looked for.
+   !> From amplitude to amplitude.
    subroutine next(self, case, observer, point, more, error)
       class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in) :: case
@@ -105,19 +120,21 @@ contains
          call follow(self, case, observer, point, error)
          if (allocated(error) .or. .not. self%begins) return
       end if
-      if (more .and. case%mode%continuation == continuation_natural) then
-         call next_amplitude(self, case, point, more, error)
-      else if (more .and. self%table%n == 0) then
-         call begin_branch(self, case, point, error)
-      else if (more) then
-         call next_of_branch(self, case, point, more, error)
-      end if
-      if (allocated(error) .or. more) return
+      if (more) call next_amplitude(self, case, point, more, error)
+      if (.not. (more .or. allocated(error))) call look_behind(self, case, error)
+   end subroutine next
+
+   !> Behind the last row limit cycles and the onset of slip are looked for.
+   subroutine look_behind(self, case, error)
+      class(mode_analysis), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
       call self%cycles%find(self%path, self%table, error)
       if (allocated(error) .or. self%at_rest%slides) return
       call self%onset%find(self%path, case%mode%end, .not. self%falls_short, self%table%onset, &
                            error)
-   end subroutine next
+   end subroutine look_behind
 
    subroutine conclude(self, case, run, error)
       class(mode_analysis), intent(inout), target :: self
@@ -385,65 +402,84 @@ contains
    end subroutine turn
 
    !> The branch from the first solution, which is its first point.
-   subroutine begin_branch(self, case, point, error)
-      class(mode_analysis), intent(inout), target :: self
+   subroutine begin_branch(self, case, observer, point, more, error)
+      class(mode_curve), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(point_type), intent(inout) :: point
-      type(error_type), allocatable, intent(out) :: error
-
-      call settle_phase(self, self%y, self%report, error)
-      if (allocated(error)) return
-      associate (branch => self%branch, system => self%at_rest%system)
-         ! The tangent of the branch takes the whole derivative.
-         system%reduced = .false.
-         branch%options = case%solver
-         branch%start = log(case%mode%start)
-         branch%finish = log(case%mode%end)
-         branch%max_points = case%mode%max_points
-         branch%step = 1.0_wp/real(case%mode%n_points - 1, wp)
-         ! Nothing of the curve is known beforehand: tongues of internal resonances are narrow.
-         branch%longest = min(branch%longest, branch%step)
-         call branch%begin(system, self%y, error)
-      end associate
-      if (allocated(error)) return
-      call take_row(case, self, self%y, self%report, served_by_arclength, point, error)
-   end subroutine begin_branch
-
-   !> The next point with the phase that results have: the branch itself keeps the one that it
-   !> began with.
-   subroutine next_of_branch(self, case, point, more, error)
-      class(mode_analysis), intent(inout), target :: self
-      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
       type(point_type), intent(inout) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: found
+
+      more = .true.
+      associate (of => self%of)
+         call follow(of, case, observer, point, error)
+         self%falls_short = of%falls_short
+         if (.not. (allocated(error) .or. of%begins)) call look_behind(of, case, error)
+         if (allocated(error) .or. .not. of%begins) return
+         call settle_phase(of, of%y, of%report, error)
+         if (allocated(error)) return
+         ! The tangent of the branch takes the whole derivative.
+         of%at_rest%system%reduced = .false.
+         call self%set_out(case%solver, log([case%mode%start, case%mode%end]), &
+                           case%mode%n_points, case%mode%max_points)
+         ! Nothing of the curve is known beforehand: tongues of internal resonances are narrow.
+         self%curve%longest = min(self%curve%longest, self%curve%step)
+         call self%follow(of%at_rest%system, of%y, error)
+         if (allocated(error)) return
+         call take_row(case, of, of%y, of%report, served_by_arclength, point, error)
+      end associate
+   end subroutine begin_branch
+
+   !> A point with the phase that results have: the branch itself keeps the one that it began with.
+   subroutine add_branch_point(self, case, observer, found, point, more, error)
+      class(mode_curve), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(branch_point), intent(in) :: found
+      type(point_type), intent(inout) :: point
+      logical, intent(out) :: more
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: y(size(found%x))
       complex(wp), allocatable :: before(:)
 
-      associate (branch => self%branch, system => self%at_rest%system)
-         call branch%next(system, found, more, error)
-         if (more .and. .not. allocated(error)) then
-            more = .not. is_lost(found%x)
-            if (more) then
-               before = system%before
-               call system%set_parameter(found%p, error)
-               if (.not. allocated(error)) then
-                  call settle_phase(self, found%x, found%report, error)
-               end if
-               if (.not. allocated(error)) call take_row(case, self, found%x, found%report, &
-                                                         served_by_arclength, point, error)
-               system%before = before
-               if (.not. allocated(error)) return
-            else
-               call end_early(self, case, exp(found%p), 'its frequency vanishes at')
-               return
-            end if
-         end if
-         call self%path%mode%newton%linear%add_work(branch%corrector%linear)
-         if (allocated(error) .or. branch%complete) return
-         call end_early(self, case, exp(self%end_p), branch%ending//', at')
+      associate (unused => observer)
       end associate
-   end subroutine next_of_branch
+      y = found%x
+      report = found%report
+      more = .not. is_lost(y)
+      if (.not. more) then
+         call end_early(self%of, case, exp(found%p), 'its frequency vanishes at')
+         return
+      end if
+      associate (system => self%of%at_rest%system)
+         before = system%before
+         call system%set_parameter(found%p, error)
+         if (.not. allocated(error)) call settle_phase(self%of, y, report, error)
+         if (.not. allocated(error)) call take_row(case, self%of, y, report, served_by_arclength, &
+                                                   point, error)
+         system%before = before
+      end associate
+   end subroutine add_branch_point
+
+   !> Why it ended, unless that was said.
+   subroutine close_branch(self, case, observer, error)
+      class(mode_curve), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (unused => observer)
+      end associate
+      associate (of => self%of, curve => self%curve)
+         if (.not. of%falls_short) then
+            call of%path%mode%newton%linear%add_work(curve%corrector%linear)
+            if (.not. curve%complete) call end_early(of, case, exp(of%end_p), curve%ending//', at')
+         end if
+         self%falls_short = of%falls_short
+         call look_behind(of, case, error)
+      end associate
+   end subroutine close_branch
 
    !> A point of the result from the unknowns at the present amplitude.
    subroutine take_row(case, curve, unknowns, report, served_by, point, error)

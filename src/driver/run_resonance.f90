@@ -3,7 +3,8 @@ module fw_run_resonance
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_analysis, only: analysis, run_type
    use fw_case, only: case_type
-   use fw_continuation, only: arclength_type, branch_point
+   use fw_continuation, only: branch_point
+   use fw_curve_source, only: curve_source
    use fw_error, only: error_type
    use fw_kinds, only: pi, wp
    use fw_model, only: model_type
@@ -31,8 +32,8 @@ module fw_run_resonance
       class(resonance_track), allocatable :: track
       type(walk_type) :: walk
       type(resonance_table) :: table
-      !> Along a branch alone.
-      type(arclength_type) :: branch
+      !> The source along a branch.
+      type(resonance_curve), allocatable :: along
       !> Maxima that are corners.
       integer :: n_corners = 0
       logical :: has_begun = .false.
@@ -41,6 +42,15 @@ module fw_run_resonance
       procedure :: next
       procedure :: conclude
    end type resonance_analysis
+
+   !> The resonance along its branch, through folds over the parameter.
+   type, extends(curve_source) :: resonance_curve
+      type(resonance_analysis), pointer :: of => null()
+   contains
+      procedure :: begin
+      procedure :: add
+      procedure :: close
+   end type resonance_curve
 
    !> By how much another point has to be larger: a phase resonance is not the largest itself.
    real(wp), parameter :: larger = 1.0e-6_wp, larger_by_phase = 0.05_wp
@@ -57,9 +67,13 @@ contains
       call self%track%start(case, error)
       if (allocated(error)) return
       self%run => run
-      call run%begin_points(case, self, merge(0, case%resonance%n_points, &
-                                              case%resonance%continuation == &
-                                              continuation_arclength))
+      if (case%resonance%continuation == continuation_arclength) then
+         allocate (self%along)
+         self%along%of => self
+         call run%begin_points(case, self%along, 0)
+      else
+         call run%begin_points(case, self, case%resonance%n_points)
+      end if
       call self%track%strategy%level%solver%about%start_clock()
    end subroutine start
 
@@ -71,34 +85,38 @@ contains
       type(point_type), intent(out) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      logical :: along_branch
 
-      along_branch = case%resonance%continuation == continuation_arclength
       if (.not. self%has_begun) then
          self%has_begun = .true.
-         call self%track%find_first(observer, error)
-         if (allocated(error)) return
-         if (self%track%outcome%kind /= outcome_found) then
-            call find_nothing(self, case, point, more, error)
-            return
-         end if
-         call self%track%begin_walk(self%walk)
-         more = .true.
-         call take_row(case, self, .true., merge(served_by_arclength, served_by_newton, &
-                                                 along_branch), point, error)
+         call find_first(self, case, observer, served_by_newton, point, more, error)
          return
       end if
       more = .not. self%falls_short
       if (.not. more) return
-      if (along_branch) then
-         if (self%table%n == 1) call begin_branch(self, case, error)
-         if (allocated(error)) return
-         call next_of_branch(self, case, point, more, error)
-      else
-         call next_value(self, case, point, more, error)
-      end if
+      call next_value(self, case, point, more, error)
       if (.not. (more .or. allocated(error))) call remark_resonance(case, self, observer, error)
    end subroutine next
+
+   !> The resonance at the first value; `more` is false where there is not even a row without one.
+   subroutine find_first(self, case, observer, served_by, point, more, error)
+      class(resonance_analysis), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      integer, intent(in) :: served_by
+      type(point_type), intent(inout) :: point
+      logical, intent(out) :: more
+      type(error_type), allocatable, intent(out) :: error
+
+      more = .true.
+      call self%track%find_first(observer, error)
+      if (allocated(error)) return
+      if (self%track%outcome%kind == outcome_found) then
+         call self%track%begin_walk(self%walk)
+         call take_row(case, self, .true., served_by, point, error)
+      else
+         call find_nothing(self, case, point, more, error)
+      end if
+   end subroutine find_first
 
    subroutine conclude(self, case, run, error)
       class(resonance_analysis), intent(inout), target :: self
@@ -200,60 +218,60 @@ contains
    end subroutine end_early
 
    !> From the first resonance on.
-   subroutine begin_branch(self, case, error)
-      class(resonance_analysis), intent(inout), target :: self
+   subroutine begin(self, case, observer, point, more, error)
+      class(resonance_curve), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: y(size(self%track%x))
-
-      associate (r => case%resonance, track => self%track, branch => self%branch)
-         branch%options = track%newton%options
-         branch%start = r%coordinate_of(r%start)
-         branch%finish = r%coordinate_of(r%end)
-         branch%max_points = r%max_points
-         branch%step = 1.0_wp/real(r%n_points - 1, wp)
-         branch%longest = min(branch%longest, branch%step)
-         call track%phase%pack_point(track%x, y)
-         call branch%begin(track%phase, y, error)
-      end associate
-   end subroutine begin_branch
-
-   !> The next point in the order in which the branch has them.
-   subroutine next_of_branch(self, case, point, more, error)
-      class(resonance_analysis), intent(inout), target :: self
-      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
       type(point_type), intent(inout) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: found
+      real(wp), allocatable :: y(:)
 
-      associate (track => self%track, branch => self%branch)
-         call branch%next(track%phase, found, more, error)
-         if (more .and. .not. allocated(error)) then
-            call add_branch_point(self, case, found, point, error)
-            if (.not. allocated(error)) return
-         end if
-         call track%newton%linear%add_work(branch%corrector%linear)
-         if (allocated(error)) return
-         ! The last attempt may have been elsewhere.
-         associate (last => self%table%row(self%table%n)%parameter)
-            call track%restore(last, error)
-            if (allocated(error) .or. branch%complete) return
-            call end_early(self, case, last, branch%ending)
-         end associate
+      call find_first(self%of, case, observer, served_by_arclength, point, more, error)
+      self%falls_short = self%of%falls_short
+      if (allocated(error) .or. self%falls_short) return
+      associate (r => case%resonance, track => self%of%track)
+         call self%set_out(track%newton%options, [r%coordinate_of(r%start), &
+                                                  r%coordinate_of(r%end)], r%n_points, r%max_points)
+         self%curve%longest = min(self%curve%longest, self%curve%step)
+         allocate (y(size(track%x)))
+         call track%phase%pack_point(track%x, y)
+         call self%follow(track%phase, y, error)
       end associate
-   end subroutine next_of_branch
+   end subroutine begin
+
+   !> The last attempt may have been elsewhere than the last row.
+   subroutine close(self, case, observer, error)
+      class(resonance_curve), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (of => self%of, curve => self%curve, last => self%of%table%row(self%of%table%n))
+         call of%track%newton%linear%add_work(curve%corrector%linear)
+         call of%track%restore(last%parameter, error)
+         if (allocated(error)) return
+         if (.not. curve%complete) call end_early(of, case, last%parameter, curve%ending)
+         self%falls_short = of%falls_short
+      end associate
+      call remark_resonance(case, self%of, observer, error)
+   end subroutine close
 
    !> The other states come to the value of a point first.
-   subroutine add_branch_point(self, case, found, point, error)
-      class(resonance_analysis), intent(inout), target :: self
+   subroutine add(self, case, observer, found, point, more, error)
+      class(resonance_curve), intent(inout), target :: self
       type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
       type(branch_point), intent(in) :: found
       type(point_type), intent(inout) :: point
+      logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
       logical :: done
 
-      associate (track => self%track)
+      associate (unused => observer)
+      end associate
+      more = .true.
+      associate (track => self%of%track)
          call track%phase%set_parameter(found%p, error)
          if (allocated(error)) return
          call track%phase%pack_point(found%x, track%x, back=.true.)
@@ -264,11 +282,11 @@ contains
          track%curve%x = track%x
          call track%curve%look(done, error)
          if (allocated(error)) return
-         call take_row(case, self, found%report%converged, served_by_arclength, point, error)
+         call take_row(case, self%of, found%report%converged, served_by_arclength, point, error)
          if (allocated(error)) return
          call track%phase%set_parameter(found%p, error)
       end associate
-   end subroutine add_branch_point
+   end subroutine add
 
    !> A point of the result from the present resonance.
    subroutine take_row(case, self, converged, served_by, point, error)

@@ -13,7 +13,7 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (107501, 1000),
+    "lines of src": (107572, 1000),
     "files of src": (463, 10),
     "lines of the longest file": (788, 50),
     "modules used by one file, at most": (32, 2),
