@@ -93,6 +93,7 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    n_dof * n_dof: "speed/I/stiffness", n_dof: "speed/I/static", at the 2 to 4 rotation speeds
                   "speed/value" (I from 0), in place of "stiffness" and "stiffness_rotation"
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
+   n_rows n_dof:  "row/matrix", displacements that are combinations of dofs, row after row
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
                   "contact/gap_rotation", "contact/normal_load_rotation",
                   "contact/tangential_stiffness", "contact/normal_stiffness",
