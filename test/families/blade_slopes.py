@@ -88,6 +88,16 @@ class Disk:
         return total
 
 
+def slopes_of(found, quantity, word, n_values):
+    """Derivatives by the values as they were given (quantities, values)."""
+    table = found[f"sensitivity/{quantity}/mistuning_{word}"][0]
+    if word == "scale":
+        return np.reshape(table, (-1, 1))
+    # One value of a sector stands for all rows of it.
+    table = np.atleast_2d(table)
+    return table.reshape(len(table), n_values, -1).sum(axis=2)
+
+
 def trial(seed, program, folder):
     disk = Disk(seed, program, folder)
     counts = {"kind": disk.law, "notes": []} | dict.fromkeys(COLUMNS, 0)
@@ -101,8 +111,7 @@ def trial(seed, program, folder):
     for word in WORDS:
         n_values = 1 if word == "scale" else np.size(disk.parts[word])
         element = int(disk.rng.integers(n_values))
-        exact = np.concatenate([np.reshape(found[f"sensitivity/{q}/mistuning_{word}"][0],
-                                           (-1, n_values))[:, element] for q in asked])
+        exact = np.concatenate([slopes_of(found, q, word, n_values)[:, element] for q in asked])
         first, second = (disk.difference(word, element, step) for step in STEPS)
         if first is None or second is None:
             counts["unsolved"] += 1
