@@ -32,6 +32,8 @@ module fw_stress_cycle
    !> Ranges on the grid that may belong to the largest, and located ones that are as large.
    real(wp), parameter :: may_be_largest = 0.8_wp, as_large = 1.0_wp - 1.0e-9_wp
    integer, parameter :: most_steps = 40
+   !> Newton's steps so small change the square of a distance by less than its round-off.
+   real(wp), parameter :: smallest_step = 1.0e-9_wp
 
    !> Deviator and trace of a stress over a period.
    type :: curve_type
@@ -150,7 +152,9 @@ contains
       w = matmul(curve%deviator, grid%waves)
       range = matmul(transpose(w), w)
       size_of = [(range(i, i), i=1, n)]
-      range = spread(size_of, 2, n) + spread(size_of, 1, n) - 2.0_wp*range
+      do j = 1, n
+         range(:, j) = size_of + size_of(j) - 2.0_wp*range(:, j)
+      end do
       associate (least => may_be_largest*maxval(range))
          allocate (found(2, n*n/2))
          n_found = 0
@@ -172,16 +176,11 @@ contains
    pure logical function is_summit(values, i, j)
       real(wp), intent(in) :: values(:, :)
       integer, intent(in) :: i, j
-      integer :: a, b, n
+      integer :: n
 
       n = size(values, 1)
-      is_summit = .true.
-      do b = -1, 1
-         do a = -1, 1
-            is_summit = is_summit .and. values(i, j) >= values(modulo(i + a - 1, n) + 1, &
-                                                               modulo(j + b - 1, n) + 1)
-         end do
-      end do
+      is_summit = values(i, j) >= maxval(values([modulo(i - 2, n) + 1, i, modulo(i, n) + 1], &
+                                                [modulo(j - 2, n) + 1, j, modulo(j, n) + 1]))
    end function is_summit
 
    !> The largest distance near two instants of the grid, and the mean stress between them.
@@ -198,6 +197,7 @@ contains
          square = distance(tau)
          do k = 1, most_steps
             step = ascent(curve, h, tau, spacing)
+            if (norm2(step) <= smallest_step) exit
             do halvings = 1, most_steps
                next = tau + step
                higher = distance(next)

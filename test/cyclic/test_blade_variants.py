@@ -15,7 +15,7 @@ from deviations import write
 from project import ROOT
 
 sys.path.insert(0, str(ROOT / "test/families"))
-from populations import Disk  # noqa: E402
+from populations import Disk
 
 EQUAL = 1e-8
 N_SECTORS, N_DISKS = 8, 6
