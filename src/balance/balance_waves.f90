@@ -55,6 +55,7 @@ contains
       !$omp end parallel do
    end procedure build_waves
 
+   !> The factors of one harmonic, from the pairs as they are now.
    subroutine build_harmonic(self, h)
       class(balance_state), intent(inout) :: self
       integer, intent(in) :: h
@@ -177,6 +178,7 @@ contains
       end associate
    end subroutine correct_by_own
 
+   !> Of each slot how many coordinates are unknowns of a step, and how stiff stuck pairs hold it.
    subroutine count_active(self, n_active, held)
       class(balance_state), intent(in) :: self
       integer, intent(out) :: n_active(:)

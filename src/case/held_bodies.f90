@@ -81,6 +81,7 @@ contains
       end do
    end subroutine pairs_of_bodies
 
+   !> What holds one body: springs, or pairs, whose forces have to carry its load.
    subroutine find_hold(case, number, hold)
       class(body_type), intent(in) :: case
       !> Of the body.

@@ -13,6 +13,7 @@ module fw_rules
 
    public :: apply_rules, rule_type, rules, write_rules
 
+   !> Two phrases that do not go together, and what to use instead.
    type :: rule_type
       character(feature_length) :: asks, forbids
       character(128) :: remedy

@@ -19,6 +19,7 @@ module fw_curve_source
 
    public :: curve_source
 
+   !> A curve by arc length. A kind says what is followed, what a row is and what ends it.
    type, abstract, extends(point_source) :: curve_source
       !> The curve that is followed, or the last one that was, and what it is a curve of.
       class(arclength_type), allocatable :: curve

@@ -27,6 +27,7 @@ module fw_explanation
       character(480) :: account = ''
    end type failure_type
 
+   !> Places where points began to fail, with what was tried there; the first ones are kept.
    type, extends(point_sink) :: failure_list
       !> Who solves, and can tell what it has tried.
       class(point_strategy), pointer :: strategy => null()

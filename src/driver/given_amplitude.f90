@@ -30,6 +30,8 @@ module fw_given_amplitude
 
    public :: given_amplitude
 
+   !> The response of a given amplitude: the vibratory load is one more unknown, the amplitude one
+   !> more equation.
    type, extends(response) :: given_amplitude
       type(control_system) :: control
       !> load%harmonic_scale of the case.
@@ -204,6 +206,7 @@ contains
       call self%control%residual(x, self%r)
    end subroutine evaluate
 
+   !> A guess by its first harmonic says nothing where the amplitude is that of it already.
    logical function offers(self, way)
       class(given_amplitude), intent(in) :: self
       type(way_type), intent(in) :: way
@@ -211,6 +214,7 @@ contains
       offers = way%kind /= way_first_harmonic .or. self%control%of /= of_first_harmonic
    end function offers
 
+   !> Loads one after another, or the balance of the first harmonic alone.
    subroutine try_own(self, way, walk, at, x, report, error)
       class(given_amplitude), intent(inout) :: self
       type(way_type), intent(in) :: way
@@ -499,6 +503,8 @@ contains
       x = found
    end subroutine look_further
 
+   !> Whether another load may give the same amplitude: friction remembers, and the point was not
+   !> reached straight from the last one.
    pure logical function may_have_others(self, walk)
       class(given_amplitude), intent(in) :: self
       type(walk_type), intent(in) :: walk
@@ -630,6 +636,7 @@ contains
                                            ': the structure vibrates by itself'
    end subroutine take_from_curve
 
+   !> The unit of the load that the curve was scaled with.
    subroutine back_to_curve(self)
       class(given_amplitude), intent(inout) :: self
 

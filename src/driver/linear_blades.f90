@@ -35,6 +35,7 @@ module fw_linear_blades
       complex(wp), allocatable :: rows(:, :), observed(:, :)
    end type tuned_type
 
+   !> Disks without joints: all share the solution of the tuned one.
    type, extends(blade_response) :: linear_response
       !> The tuned disk by its modes, the rows the last of what is observed of it.
       type(all_sectors), allocatable :: modal
@@ -75,6 +76,7 @@ contains
       allocate (self%matrix(n*r, n*r), self%block(r, r, n), self%x(n*r), self%pivot(n*r))
    end subroutine reserve
 
+   !> Take the deviations of the next disk.
    subroutine begin(self, pattern, error)
       class(linear_response), intent(inout), target :: self
       integer, intent(in) :: pattern

@@ -32,6 +32,7 @@ module fw_mission_flights
    !> wears above these parts of the largest.
    real(wp), parameter :: unchanged = 1.0e-2_wp, bears = 1.0e-6_wp, wears = 1.0e-3_wp
 
+   !> The flights of a mission: its blocks, where it is, and the control of jumps over flights.
    type :: mission_flights
       type(mission_options), pointer :: mission => null()
       type(wear_options), pointer :: wear => null()

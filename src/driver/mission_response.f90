@@ -22,6 +22,8 @@ module fw_mission_response
 
    public :: mission_analysis
 
+   !> A mission hands on its rows by itself: a row belongs to a block that has ended, not to a
+   !> frequency that is asked for.
    type, extends(analysis) :: mission_analysis
       private
       type(run_type), pointer :: run => null()
@@ -36,6 +38,7 @@ module fw_mission_response
 
 contains
 
+   !> Read and condense the blocks, and open what the result has beside the rows.
    subroutine start(self, case, run, error)
       class(mission_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case
@@ -243,6 +246,7 @@ contains
       end associate
    end subroutine resume
 
+   !> How the wear ended, and the work of all blocks.
    subroutine conclude(self, case, run, error)
       class(mission_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case

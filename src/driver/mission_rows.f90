@@ -22,6 +22,7 @@ module fw_mission_rows
       real(wp) :: spacing = 0.0_wp
    end type row_type
 
+   !> Rows of a mission that wait until the flight that they belong to is accepted.
    type :: mission_rows
       type(run_type), pointer :: run => null()
       type(restart_row_set) :: for_restart

@@ -7,6 +7,7 @@ module fw_remark_table
 
    public :: write_message_kinds, write_remark_kinds
 
+   !> A remark: its name, and when it is made.
    type :: remark_kind
       !> By which programs know it.
       character(28) :: name
@@ -197,6 +198,7 @@ module fw_remark_table
                   'resonances that the unknowns of the joint do not show may be stepped '// &
                   'over')]
 
+   !> A message: what it says, and what to do about it.
    type :: message_kind
       !> As it is shown, with dots for what differs.
       character(128) :: message

@@ -30,6 +30,7 @@ module fw_run_mode
 
    public :: mode_analysis
 
+   !> A nonlinear mode over its amplitude, natural or by arc length; it is the source of its rows.
    type, extends(analysis) :: mode_analysis
       private
       type(run_type), pointer :: run => null()
@@ -82,6 +83,7 @@ contains
       call self%at_rest%build(case, error)
    end subroutine check
 
+   !> The mode at rest, then the source: the amplitudes in their order, or the branch.
    subroutine start(self, case, run, error)
       class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case
@@ -136,6 +138,7 @@ contains
                            error)
    end subroutine look_behind
 
+   !> The onset of slip, the response that the mode makes, and remarks on where the curve ended.
    subroutine conclude(self, case, run, error)
       class(mode_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case
@@ -162,6 +165,7 @@ contains
       end if
    end subroutine conclude
 
+   !> The linear mode from which the curve starts.
    subroutine describe_start(start, table)
       type(mode_start), intent(in) :: start
       type(mode_table), intent(inout) :: table

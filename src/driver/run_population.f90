@@ -31,6 +31,7 @@ module fw_run_population
 
    public :: population_analysis
 
+   !> Many mistuned disks, each solved for its largest amplitude alone.
    type, extends(analysis) :: population_analysis
    contains
       procedure :: start
@@ -287,6 +288,7 @@ contains
       end if
    end subroutine new_case
 
+   !> Take the next disk: its own case, and a strategy that knows nothing of the last one.
    subroutine begin_balanced(self, pattern, error)
       class(balanced_response), intent(inout), target :: self
       integer, intent(in) :: pattern

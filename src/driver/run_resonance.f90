@@ -26,9 +26,12 @@ module fw_run_resonance
 
    public :: resonance_analysis
 
+   !> The resonance at each value of a parameter, natural or by arc length; it is the source of its
+   !> rows.
    type, extends(analysis) :: resonance_analysis
       private
       type(run_type), pointer :: run => null()
+      !> The equations of a resonance, the walk to a value, and what is written beside the rows.
       class(resonance_track), allocatable :: track
       type(walk_type) :: walk
       type(resonance_table) :: table
@@ -57,6 +60,7 @@ module fw_run_resonance
 
 contains
 
+   !> The source: the values in their order, or the branch.
    subroutine start(self, case, run, error)
       class(resonance_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case
@@ -118,6 +122,7 @@ contains
       end if
    end subroutine find_first
 
+   !> Corners, work and derivatives of the whole run.
    subroutine conclude(self, case, run, error)
       class(resonance_analysis), intent(inout), target :: self
       type(case_type), intent(in), target :: case

@@ -23,6 +23,7 @@ module fw_vibration_branch
 
    public :: vibration_branch
 
+   !> A response along its curve, one branch for each level.
    type, extends(curve_source) :: vibration_branch
       !> Solves the first point of each branch; the curve is that of its vibration.
       type(walked_points), pointer, private :: strategy => null()

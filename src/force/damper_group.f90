@@ -22,6 +22,7 @@ module fw_damper_group
    !> Instants of forces that are no polynomials of the motion.
    integer, parameter :: of_broken_power = 512, for_each_harmonic = 16
 
+   !> Dampers with powers of velocity and displacement.
    type, extends(element_group) :: damper_group
       !> Signed dofs, 0 for the ground, and the sector of side 2 (n_dampers).
       integer, allocatable :: side_1(:), side_2(:), sector_2(:)
@@ -41,6 +42,7 @@ module fw_damper_group
       procedure :: is_linear
    end type damper_group
 
+   !> Their force at an instant, of a displacement and a velocity.
    type, extends(instant_law) :: damper_law
       !> (n_elements)
       real(wp), allocatable :: coefficient(:), power(:)
@@ -62,6 +64,7 @@ contains
       end associate
    end function name
 
+   !> The key that says how many there are.
    pure function count_key(self)
       class(damper_group), intent(in) :: self
       character(group_name_length) :: count_key
@@ -71,6 +74,7 @@ contains
       end associate
    end function count_key
 
+   !> What has to be known before the other keys have their sizes.
    subroutine bind_count(self, keys)
       class(damper_group), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
@@ -112,6 +116,7 @@ contains
       if (allocated(self%side_1)) n_held = size(self%side_1)
    end function n_held
 
+   !> The first value that no damper has, with its key.
    pure subroutine find_fault(self, key, text)
       class(damper_group), intent(in) :: self
       character(24), intent(out) :: key
@@ -129,6 +134,7 @@ contains
       end do
    end subroutine find_fault
 
+   !> Fill in what was not given.
    subroutine settle(self)
       class(damper_group), intent(inout) :: self
 
@@ -148,12 +154,14 @@ contains
                                         n_sectors))
    end subroutine make_law
 
+   !> Whether the force changes its sign with the motion.
    pure logical function is_odd(self)
       class(damper_group), intent(in) :: self
 
       is_odd = all(modulo(self%position_power, 2) == 0)
    end function is_odd
 
+   !> Whether all of them are viscous dampers.
    pure logical function is_linear(self)
       class(damper_group), intent(in) :: self
 
@@ -211,6 +219,7 @@ contains
       end associate
    end subroutine act
 
+   !> One for each coefficient.
    pure integer function n_parameters(self) result(n)
       class(damper_law), intent(in) :: self
 

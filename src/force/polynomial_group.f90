@@ -21,6 +21,7 @@ module fw_polynomial_group
    !> More terms are taken for a mistake.
    integer, parameter :: most = 1000000
 
+   !> Forces that are polynomials of several dofs, term by term or as a potential.
    type, extends(element_group) :: polynomial_group
       !> What the terms are, a number in `of_words`.
       integer :: of = of_energy
@@ -57,6 +58,7 @@ contains
       end associate
    end function name
 
+   !> The key that says how many there are.
    pure function count_key(self)
       class(polynomial_group), intent(in) :: self
       character(group_name_length) :: count_key
@@ -66,6 +68,7 @@ contains
       end associate
    end function count_key
 
+   !> What has to be known before the other keys have their sizes.
    subroutine bind_count(self, keys)
       class(polynomial_group), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
@@ -105,6 +108,7 @@ contains
       if (allocated(self%factors)) n_held = size(self%factors, 2)
    end function n_held
 
+   !> The first value that no polynomial has, with its key.
    pure subroutine find_fault(self, key, text)
       class(polynomial_group), intent(in) :: self
       character(24), intent(out) :: key
@@ -309,12 +313,14 @@ contains
                                       self%coefficient))
    end subroutine make_law
 
+   !> Whether all powers are odd: even harmonics may be left out then.
    pure logical function is_odd(self)
       class(polynomial_group), intent(in) :: self
 
       is_odd = all(modulo(degrees(self), 2) == 1)
    end function is_odd
 
+   !> Whether nothing depends on the amplitude.
    pure logical function is_linear(self)
       class(polynomial_group), intent(in) :: self
 

@@ -14,12 +14,14 @@ module fw_several_laws
 
    public :: several_laws, common_facts
 
+   !> A law and the pairs that follow it.
    type :: member_type
       class(pair_law), allocatable :: law
       !> Its pairs among all (n_elements of the law).
       integer, allocatable :: pair(:)
    end type member_type
 
+   !> Pairs of several laws, which the rest of the program takes for one.
    type, extends(pair_law) :: several_laws
       type(member_type), allocatable, private :: member(:)
       !> Of each pair its member, and its place there (n_elements).
@@ -385,6 +387,7 @@ contains
       end select
    end subroutine sample
 
+   !> Each member writes the forces of its own pairs.
    subroutine coefficients(self, work, computed, fourier, force)
       class(several_laws), intent(in) :: self
       type(force_workspace), intent(inout) :: work
@@ -442,6 +445,7 @@ contains
       end select
    end subroutine fractions
 
+   !> Asks the member that the element belongs to.
    pure real(wp) function slope_at_rest(self, element, component) result(slope)
       class(several_laws), intent(in) :: self
       integer, intent(in) :: element, component
@@ -491,6 +495,7 @@ contains
       call self%member(self%of_member(element))%law%input_of_pressure(self%place(element), y)
    end subroutine input_of_pressure
 
+   !> By a constant that the law of the element does not take the derivative is 0, and not known.
    pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
       class(several_laws), intent(in) :: self
       integer, intent(in) :: element
@@ -524,6 +529,7 @@ contains
       name = self%member(self%of_member(element))%law%pressing_constant(self%place(element))
    end function pressing_constant
 
+   !> The most that any member wants: instants are common to all.
    pure integer function instants_wanted(self, work) result(n)
       class(several_laws), intent(in) :: self
       type(force_workspace), intent(in) :: work

@@ -84,6 +84,7 @@ contains
       end if
    end subroutine check_of_loads
 
+   !> Whether a load is there at all: a parameter that scales nothing is a mistake.
    pure logical function acts(load)
       real(wp), allocatable, intent(in) :: load(:)
 

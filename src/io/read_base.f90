@@ -57,6 +57,7 @@ contains
       end associate
    end subroutine read_base
 
+   !> Keys that contradict each other, before sizes are looked at.
    subroutine check_keys(reader, is_cyclic, base)
       type(reader_type), intent(inout) :: reader
       logical, intent(in) :: is_cyclic
@@ -91,6 +92,7 @@ contains
       end do
    end subroutine check_keys
 
+   !> Supports are dofs of the model, each of them once.
    subroutine check_dofs(reader, n_dof, dof)
       type(reader_type), intent(inout) :: reader
       integer, intent(in) :: n_dof, dof(:)

@@ -166,6 +166,7 @@ contains
                           load(:, 1)
    end subroutine join_bodies
 
+   !> The hermitian part.
    pure function hermitian(matrix) result(sound)
       complex(wp), intent(in) :: matrix(:, :)
       complex(wp), allocatable :: sound(:, :)

@@ -21,6 +21,8 @@ module fw_ring_update
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
+   !> The inverse of what a ring of equal sectors is with a deviation of each, by factors of sectors
+   !> and a few shapes that join them.
    type :: ring_update
       integer :: n_rows = 0, n_sectors = 0, n_shapes = 0
       !> Transposed F_j (n_rows, n_rows, n_sectors), the shapes (n_rows, n_shapes), and V^H F_j
@@ -39,6 +41,7 @@ module fw_ring_update
 
 contains
 
+   !> Factors for one set of deviations; the shapes are those of what joins the sectors.
    subroutine build(self, gamma, block, left_out, most, done)
       class(ring_update), intent(inout) :: self
       !> Gamma of the waves k = 0 .. n_sectors - 1, and D of the sectors (n_rows, n_rows,

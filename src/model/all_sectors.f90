@@ -36,6 +36,7 @@ module fw_all_sectors
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
+   !> All sectors of a disk: waves of the tuned disk, and beside them what makes sectors differ.
    type, extends(structure_operator) :: all_sectors
       type(cyclic_type), private :: cyclic
       !> Bases of k = 0 .. N/2; those of N - k are their conjugates.
@@ -543,6 +544,7 @@ contains
       end do
    end function is_modal
 
+   !> Rows of a sector by which it deviates from the tuned one.
    pure integer function n_own(self)
       class(all_sectors), intent(in) :: self
 
@@ -550,6 +552,7 @@ contains
       if (allocated(self%deviation)) n_own = self%deviation%n_rows
    end function n_own
 
+   !> Those rows in the coordinates of the wave k.
    subroutine own_rows(self, k, rows)
       class(all_sectors), intent(in) :: self
       integer, intent(in) :: k
@@ -560,6 +563,7 @@ contains
          self%deviation%wave(:, :, k + 1)
    end subroutine own_rows
 
+   !> The deviations of all sectors from the tuned dynamic stiffness, harmonic h.
    subroutine own_block(self, state, h, matrix)
       class(all_sectors), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -574,6 +578,7 @@ contains
       end select
    end subroutine own_block
 
+   !> Values of those rows, of coordinates of all sectors.
    subroutine read_own(self, sectors, rows)
       class(all_sectors), intent(in) :: self
       complex(wp), intent(in) :: sectors(:, :)
@@ -583,6 +588,7 @@ contains
       if (allocated(self%deviation)) call self%deviation%read_rows(sectors, rows)
    end subroutine read_own
 
+   !> Their transpose: forces on the rows to forces on the coordinates.
    subroutine add_own(self, rows, sectors)
       class(all_sectors), intent(in) :: self
       complex(wp), intent(in) :: rows(:, :)
@@ -634,6 +640,7 @@ contains
       pulls_observed = .not. any([(self%basis(k)%has_whirl(), k=1, size(self%basis))])
    end function pulls_observed
 
+   !> Other deviations of the same rows, as a parameter that moves or the next disk has them.
    pure subroutine take_deviation(self, deviation)
       class(all_sectors), intent(inout) :: self
       type(deviation_type), intent(in) :: deviation
@@ -641,6 +648,7 @@ contains
       if (allocated(self%deviation)) self%deviation%of = deviation
    end subroutine take_deviation
 
+   !> In the mean over the sectors, which are alike but for small deviations.
    pure real(wp) function static_stiffness(self, coordinate)
       class(all_sectors), intent(in) :: self
       integer, intent(in) :: coordinate

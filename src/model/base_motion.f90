@@ -38,6 +38,7 @@ module fw_base_motion
    !> Stiffness of a support that nothing is joined to any more, over the largest of the structure.
    real(wp), parameter :: support_stiffness = 1.0e-6_wp
 
+   !> Motion of supports, or of the ground in a direction, in harmonics of the response.
    type :: base_motion
       integer :: n_terms = 0
       !> Signed dofs of the supports, or R of the ground (n_dof); one of the two is allocated.

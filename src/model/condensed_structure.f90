@@ -16,6 +16,7 @@ module fw_condensed_structure
 
    public :: condensed_structure, condensed_state
 
+   !> What plain structures and sectors have in common once they are condensed to their coordinates.
    type, abstract, extends(structure_operator) :: condensed_structure
       type(reduction_type) :: basis
    contains

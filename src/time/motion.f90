@@ -15,6 +15,7 @@ module fw_motion
                          motion_settles = 3, motion_leaves = 4, motion_grows = 5, &
                          motion_irregular = 6
 
+   !> What an integration in time from a failed point comes to.
    type :: motion_type
       integer :: kind = motion_unknown
       !> Periods of the load after which it repeats.

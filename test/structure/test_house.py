@@ -13,8 +13,8 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (107572, 1000),
-    "files of src": (463, 10),
+    "lines of src": (110600, 1000),
+    "files of src": (476, 10),
     "lines of the longest file": (788, 50),
     "modules used by one file, at most": (32, 2),
     "files that name forces%pairs": (42, 0),
