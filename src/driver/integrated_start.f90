@@ -87,7 +87,8 @@ contains
       type(case_type), intent(out) :: fast
 
       fast = case
-      fast%harmonics%n_harmonics = max(1, case%model%waves%highest())
+      fast%harmonics%n_harmonics = max(1, case%model%waves%highest(), &
+                                        case%contact%highest_gap())
       fast%solver%fallback = .false.
       fast%solver%tolerance = close_enough
       fast%time%n_periods = few_periods
