@@ -105,6 +105,8 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    n_springs:     "spring/coefficient", as many as "spring/side_1" has dofs
    m * 2:         "contact/table", overclosure and force of each point
    3 * n_pairs:   "contact/position", pair after pair
+   m * n_pairs:   "contact/gap_cosine", "contact/gap_sine", gaps of m harmonics each, harmonic after
+                  harmonic; "contact/gap_harmonic" (fw_put_integers) before them
    m * n_dof:     "load/harmonic_cosine", "load/harmonic_sine", a load of m harmonics each, harmonic
                   after harmonic
    Of sectors, with "cyclic/n_sectors" before them; complex numbers are two values each, matrices

@@ -67,7 +67,12 @@ class ContactPairs:
     mu_viscous : float or (n_pairs,), optional
         What friction gains with the sliding speed [s/length] ('regularised').
     speed_1, speed_2 : float or (n_pairs,), optional
-        Velocity of side 2 along t1 and t2 [length/s] ('regularised').
+        Velocity of side 2 along t1 and t2 [length/s].
+    sliding : str, optional
+        How friction follows these: 'path' (default) or 'steady'.
+    gap_harmonic : mapping, optional
+        What an obstacle adds to the gap: harmonics 0, 1, .., with their cosine and sine parts, a
+        pair of float or (n_pairs,) [length].
     iwan_chi, iwan_beta : float or (n_pairs,), optional
         Exponent of the sliding limits, above -1, and the stiffness that is lost at once where the
         last elements slip over that lost before ('iwan').
@@ -122,6 +127,8 @@ class ContactPairs:
     table: ArrayLike | None = None
     gap_rotation: ArrayLike | None = None
     normal_load_rotation: ArrayLike | None = None
+    sliding: str | None = None
+    gap_harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -134,6 +141,13 @@ class ContactPairs:
             for name in ("mu", "gap", "area", *_IN_NAMELIST)}
         values["law"] = _words("contact.law", self.law, n_pairs)
         values["normal_law"] = _words("contact.normal_law", self.normal_law, n_pairs)
+        if self.sliding is not None:
+            if self.sliding not in _SLIDES:
+                raise InputError(f"contact.sliding: is {self.sliding!r}, must be 'path' or "
+                                 "'steady'")
+            values["sliding"] = self.sliding
+        if self.gap_harmonic is not None:
+            values["gap_harmonic"] = _gaps(self.gap_harmonic, n_pairs)
         if self.table is not None:
             values["table"] = array("contact.table", self.table, (None, 2))
         if self.sector_2 is not None:
@@ -496,7 +510,7 @@ class Model:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
                 "mass", "stiffness", "damping", "stiffness_rotation", *_MATRICES,
-                *_CONTACT, *_LOADS, "contact/law", "contact/normal_law", "contact/table",
+                *_CONTACT, *_LOADS, "contact/law", "contact/normal_law", "contact/table", *_GAPS,
                 "base/dof", "base/direction", "load/table", "row/matrix",
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
@@ -548,6 +562,8 @@ class Model:
                     groups.setdefault("contact", {})[name] = words
                 elif words is not None:
                     pairs[f"contact/{name}"] = strings(words)
+            if (word := getattr(self.contact, "sliding", None)) is not None:
+                groups.setdefault("contact", {})["sliding"] = word
             if (table := getattr(self.contact, "table", None)) is not None:
                 pairs["contact/table"] = table
             if self.mistuning is not None:
@@ -594,6 +610,12 @@ class Model:
                 value = getattr(self.contact, name.split("/")[1])
                 if value is not None:
                     found[name] = strings(value) if name == "contact/patch" else value
+            if self.contact.gap_harmonic:
+                found["contact/gap_harmonic"] = np.array(list(self.contact.gap_harmonic),
+                                                         dtype=np.int64)
+                for i, part in enumerate(("cosine", "sine")):
+                    found[f"contact/gap_{part}"] = np.array(
+                        [parts[i] for parts in self.contact.gap_harmonic.values()])
         for one in self.elements:
             found.update(one.datasets())
         if self.sectors is not None:
@@ -648,7 +670,7 @@ class Model:
             if self.contact.patch is not None:
                 session.put_texts("contact/patch", self.contact.patch)
             settings += [(f"contact%{name}", literal(getattr(self.contact, name)))
-                         for name in ("law", "normal_law", *_IN_NAMELIST)
+                         for name in ("law", "normal_law", "sliding", *_IN_NAMELIST)
                          if getattr(self.contact, name) is not None]
             if self.contact.table is not None:
                 table = np.asarray(self.contact.table)
@@ -675,6 +697,8 @@ _CONTACT = tuple(f"contact/{name}" for name in (
 #: Constants that a session takes as keys, so that one of another law is refused.
 _SLIDING = ("slip_speed", "mu_dynamic", "weakening_speed", "weakening_exponent", "mu_viscous",
             "speed_1", "speed_2")
+_GAPS = ("contact/gap_harmonic", "contact/gap_cosine", "contact/gap_sine")
+_SLIDES = ("path", "steady")
 _HYSTERESIS = ("iwan_chi", "iwan_beta", "bouc_wen_exponent", "bouc_wen_beta")
 _PRESSING = ("normal_coefficient", "normal_exponent", "reference_force", "decay_length")
 _IN_NAMELIST = ("normal_load", "gap_rotation", "normal_load_rotation", "tangential_stiffness",
@@ -699,6 +723,23 @@ def _order(M: ArrayLike | None, C: ArrayLike | None, K: ArrayLike | None,
     if C is None and mass != stiffness:
         raise InputError(f"M and K: are of order {mass} and {stiffness}, must be the same")
     return stiffness if C is not None and np.shape(C) == (stiffness, stiffness) else mass
+
+
+def _gaps(harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]],
+          n_pairs: int) -> dict[int, tuple[Floats, Floats]]:
+    """Cosine and sine parts of gaps by their harmonics."""
+    if not isinstance(harmonic, Mapping):
+        raise InputError(f"contact.gap_harmonic: is a {type(harmonic).__name__}, must be a "
+                         "dictionary of harmonics")
+    found = {}
+    for n, parts in harmonic.items():
+        if not isinstance(n, (int, np.integer)) or n < 0:
+            raise InputError(f"contact.gap_harmonic, a key: is {n!r}, must be 0, 1, 2, ..")
+        if not isinstance(parts, (tuple, list, np.ndarray)) or len(parts) != 2:
+            raise InputError(f"contact.gap_harmonic[{n}]: must be a pair of gaps, cosine and sine")
+        cosine, sine = (array(f"contact.gap_harmonic[{n}]", part, (n_pairs,)) for part in parts)
+        found[int(n)] = cosine, sine
+    return found
 
 
 def _waves(harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]],
@@ -786,14 +827,28 @@ def _contact_of(found: Mapping[str, Any], file: h5py.File) -> ContactPairs | Non
         "side_2", "sector_2", "mu", "gap", "area", "position", *_IN_NAMELIST)}
     patch = found.get("contact/patch")
     names = None if patch is None else [_text(name) for name in patch]
-    words: dict[str, str | list[str]] = {}
+    words: dict[str, Any] = {}
     for name in ("law", "normal_law"):
         if name in file["contact"].attrs:
             words[name] = _text(file["contact"].attrs[name])
         elif f"contact/{name}" in found:
             words[name] = [_text(word) for word in found[f"contact/{name}"]]
+    if "sliding" in file["contact"].attrs:
+        words["sliding"] = _text(file["contact"].attrs["sliding"])
     return ContactPairs(found["contact/side_1"], **parts, patch=names,
-                        table=found.get("contact/table"), **words)
+                        gap_harmonic=_gaps_of(found), table=found.get("contact/table"), **words)
+
+
+def _gaps_of(found: Mapping[str, Any]) -> dict[int, tuple[Floats, Floats]] | None:
+    harmonics, cosine, sine = (found.get(name) for name in _GAPS)
+    if harmonics is None:
+        return None
+    some = cosine if sine is None else sine
+    if some is None:
+        raise InputError("dataset /contact/gap_harmonic: needs /contact/gap_cosine or gap_sine")
+    none = np.zeros_like(some)
+    return {int(n): (none[i] if cosine is None else cosine[i], none[i] if sine is None else sine[i])
+            for i, n in enumerate(harmonics)}
 
 
 def _words(name: str, words: str | Sequence[str] | None,

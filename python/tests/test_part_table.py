@@ -28,7 +28,7 @@ PAIRS = fw.ContactPairs(
     speed_2=0.0, iwan_chi=-0.5, iwan_beta=0.0, bouc_wen_exponent=1.0, bouc_wen_beta=0.5,
     normal_coefficient=1.0, normal_exponent=1.5, reference_force=1.0,
     decay_length=1.0, table=[[0.0, 0.0], [1.0, 2.0]], normal_law="power",
-    law="penalty")
+    law="penalty", sliding="path", gap_harmonic={2: (0.1, 0.0)})
 EYE = np.eye(6)
 
 

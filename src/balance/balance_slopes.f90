@@ -72,7 +72,7 @@ contains
                call add_outputs(self, entry, work, not_open(p, work, .false.), &
                                 self%problem%incidence%identity, m, dr)
             end if
-            if (in_time .and. p%grows() .and. p%some_are_free()) then
+            if (in_time .and. changes_with_frequency(p) .and. p%some_are_free()) then
                call add_law_by_frequency(self, entry, entry%free_rows, work, m, nc, dr)
             end if
             if (.not. p%takes_balance) cycle
@@ -80,7 +80,7 @@ contains
             call multiply_derivative(entry%row, work)
             call add_outputs(self, entry, work, not_open(p, work, .true.), &
                              self%problem%incidence%identity, m, dr)
-            if (in_time .and. p%grows()) then
+            if (in_time .and. changes_with_frequency(p)) then
                call add_law_by_frequency(self, entry, entry%rigid_rows, work, m, nc, dr)
             else if (in_time .and. p%has_inertia) then
                call add_law_by_frequency(self, entry, entry%rows, work, m, nc, dr)
@@ -88,6 +88,14 @@ contains
          end associate
       end do
    end subroutine derivative_with_forces
+
+   !> Whether gaps follow a speed that the frequency sets, or anchors move by what a side slides in
+   !> a period.
+   pure logical function changes_with_frequency(prediction) result(changes)
+      type(prediction_type), intent(in) :: prediction
+
+      changes = prediction%grows() .or. allocated(prediction%speed)
+   end function changes_with_frequency
 
    !> The elements that have forces, of those that take the balance or of those that do not.
    pure function not_open(prediction, work, takes) result(elements)

@@ -640,6 +640,8 @@ contains
          ! What a fit presses together acts like a static load, even where no load moves the joint.
          static = norm2(self%load(:, 1)) + press_of(self)
       end if
+      ! As does an obstacle that swings, even where its harmonics are the only ones.
+      static = static + swing_of(self)
       load_norm = max(load_norm, static_share*static)
       if (load_norm <= round_off*self%problem%load_size) then
          load_norm = idle_share*self%problem%load_size
@@ -647,7 +649,7 @@ contains
       ! Where nothing loads the joint: what its pairs are pressed by, or pressed together by.
       if (load_norm <= 0.0_wp) then
          associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)
-            load_norm = norm2(p%load) + norm2(p%stiffness(:, 3)*p%gap)
+            load_norm = norm2(p%load) + norm2(p%stiffness(:, 3)*p%gap) + swing_of(self)
          end associate
       end if
       if (load_norm <= 0.0_wp) load_norm = 1.0_wp
@@ -663,6 +665,17 @@ contains
          press_of = norm2(p%stiffness(:, 3)*min(p%gap, 0.0_wp))
       end associate
    end function press_of
+
+   !> Forces that the swings of gaps would have where nothing gave way.
+   real(wp) function swing_of(self)
+      type(balance_state), intent(in) :: self
+
+      swing_of = 0.0_wp
+      if (size(self%depth) == 0) return
+      associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)
+         if (allocated(p%gap_motion)) swing_of = norm2(p%stiffness(:, 3)*p%gap_swing())
+      end associate
+   end function swing_of
 
    !> R(x); see the module header.
    subroutine residual(self, x, r)
@@ -731,6 +744,7 @@ contains
 
       associate (p => entry%law%prediction, y => work%prediction)
          call self%problem%incidence%gather(entry%rows, m, nc, q, y)
+         call p%move_gaps(self%problem%fourier, y)
          do j = 1, nc
             y(:, :, j) = p%stiffness*y(:, :, j)
          end do

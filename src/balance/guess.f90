@@ -367,6 +367,8 @@ contains
       ! may press at rest.
       if (any(abs(q) > 0.0_wp)) then
          is_idle = .false.
+      else if (system%problem%n_pairs > 0 .and. gaps_move(system)) then
+         is_idle = all(held)
       else if (system%problem%fourier%harmonic(h) > 0 .or. system%problem%n_pairs == 0) then
          is_idle = all(held) .or. .not. any(abs(force) > 0.0_wp)
       else
@@ -387,6 +389,14 @@ contains
       call find_tension(system, rest, [(real(force(j), wp) - real(sum(stiffness(j, :)*q), wp), &
                                   j=1, size(q))], q, tension)
    end subroutine solve_harmonic
+
+   !> Whether gaps have harmonics of their own, which load pairs that are closed.
+   pure logical function gaps_move(system)
+      type(balance_state), intent(in) :: system
+
+      gaps_move = allocated(system%problem%forces%entry( &
+                            system%problem%forces%pairs)%law%prediction%gap_motion)
+   end function gaps_move
 
    !> Rigid pairs hold their coordinates, at minus the gap.
    subroutine hold_pairs(system, closed, h, held, q)
@@ -440,22 +450,29 @@ contains
       end associate
    end subroutine add_pairs
 
-   !> What a component of a pair has to close in a harmonic: its gap, in the static normal one.
-   pure real(wp) function gap_of(system, h, pair, component, rest) result(gap)
+   !> What a component of a pair has to close in a harmonic: the gap, of the normal one.
+   pure complex(wp) function gap_of(system, h, pair, component, rest) result(gap)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: h, pair, component
       type(rest_type), intent(in), optional :: rest
 
-      gap = 0.0_wp
-      if (component /= 3 .or. system%problem%fourier%harmonic(h) /= 0) return
+      gap = (0.0_wp, 0.0_wp)
+      if (component /= 3) return
+      if (system%problem%fourier%harmonic(h) /= 0) then
+         associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
+            if (allocated(p%gap_motion)) gap = p%gap_motion%amplitude_of( &
+               pair, system%problem%fourier%harmonic(h))
+         end associate
+         return
+      end if
       if (present(rest)) then
          if (allocated(rest%gap)) then
-            gap = rest%gap(pair)
+            gap = cmplx(rest%gap(pair), kind=wp)
             return
          end if
       end if
-      gap = system%problem%forces%entry(system%problem%forces%pairs)%law%prediction%gap_at( &
-            pair, system%frequency()) + system%depth(pair)
+      gap = cmplx(system%problem%forces%entry(system%problem%forces%pairs)%law%prediction%gap_at( &
+                  pair, system%frequency()) + system%depth(pair), kind=wp)
    end function gap_of
 
    !> Force of an elastic pair about its position at rest over the amplitude of its displacement in

@@ -335,6 +335,10 @@ contains
          ! With the speed it may come to do so.
          if (allocated(contact%gap_rotation)) interferes = interferes .or. &
             contact%gap_rotation(i) < 0.0_wp
+         ! As does an obstacle that moves.
+         if (allocated(contact%gap_harmonic)) interferes = interferes .or. &
+            any(abs(contact%gap_cosine(i, :)) > 0.0_wp) .or. &
+            any(abs(contact%gap_sine(i, :)) > 0.0_wp)
          if (interferes) moving(dofs_of(model, [contact%side_1(3, i), contact%side_2(3, i)])) = &
             .true.
       end do

@@ -105,6 +105,8 @@ module fw_point
       real(wp), allocatable :: fraction(:, :)
       !> Friction energy per cycle (n_pairs) [force * length].
       real(wp), allocatable :: dissipation(:)
+      !> Work per cycle that obstacles which move do (n_pairs) [force * length].
+      real(wp), allocatable :: obstacle_work(:)
       !> The same of elements that are neither pairs nor springs, kind by kind.
       type(element_work), allocatable :: work_of(:)
       !> Work of hysteretic damping per cycle [force * length], and the rotation speed where it

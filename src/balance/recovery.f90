@@ -4,6 +4,7 @@ module fw_recovery
    use fw_kinds, only: wp, pi
    use fw_fourier, only: coefficient_count, fourier_type, to_complex
    use fw_balance_state, only: balance_state
+   use fw_force_law, only: prediction_type
    use fw_point, only: point_type
    implicit none (type, external)
    private
@@ -181,6 +182,7 @@ contains
       integer :: i, h, k
 
       allocate (point%dissipation(system%problem%n_pairs), source=0.0_wp)
+      allocate (point%obstacle_work(system%problem%n_pairs), source=0.0_wp)
       associate (f => system%work(system%problem%forces%pairs)%force, &
                  rows => system%problem%forces%entry(system%problem%forces%pairs)%rows)
          call system%problem%incidence%gather(rows, m, system%problem%fourier%n_coefficients, q, u)
@@ -194,8 +196,32 @@ contains
                                       sum(f(i, :, k)*u(i, :, k + 1) - f(i, :, k + 1)*u(i, :, k))
             end do
          end do
+         call add_obstacles( &
+            system%problem%forces%entry(system%problem%forces%pairs)%law%prediction, &
+            system%problem%fourier, system%frequency(), f, point)
       end associate
    end subroutine dissipated_energy
+
+   !> What obstacles that move bring in is heat, too: their forces are minus those on the structure,
+   !> so that their work is that of the contact forces along the gaps, and against the speeds.
+   subroutine add_obstacles(prediction, fourier, omega, force, point)
+      type(prediction_type), intent(in) :: prediction
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: omega
+      real(wp), intent(in) :: force(:, :, :)
+      type(point_type), intent(inout) :: point
+      integer :: c
+
+      if (allocated(prediction%gap_motion)) point%obstacle_work = &
+         prediction%gap_motion%work_of(fourier, force(:, 3, :))
+      if (allocated(prediction%speed) .and. fourier%has_constant()) then
+         do c = 1, 2
+            point%obstacle_work = point%obstacle_work - &
+                                  2.0_wp*pi/omega*prediction%speed(:, c)*force(:, c, 1)
+         end do
+      end if
+      point%dissipation = point%dissipation + point%obstacle_work
+   end subroutine add_obstacles
 
    !> Work of the elements that are neither pairs nor springs, whose inputs are displacements, where
    !> the system was evaluated last.

@@ -7,6 +7,7 @@
 !>   wear volume      k_w sum over pairs of D/mu: friction works mu p a length
 module fw_response_rows
    use fw_balance_state, only: balance_state
+   use fw_force_law, only: prediction_type
    use fw_kinds, only: pi, wp
    use fw_recovery, only: observe, observed_coefficients, peak_angles
    implicit none (type, external)
@@ -158,6 +159,8 @@ contains
          end if
          call incidence%gather(state%problem%forces%entry(pairs)%rows, &
                                state%problem%structure%n_coordinates, f%n_coefficients, x, u)
+         ! Against obstacles that move it is heat.
+         call state%problem%forces%entry(pairs)%law%prediction%move_gaps(f, u)
          work = 0.0_wp
          associate (force => state%work(pairs)%force)
             do h = 1, f%n_retained
@@ -174,6 +177,8 @@ contains
                   end associate
                end do
             end do
+            call add_speeds(state, state%problem%forces%entry(pairs)%law%prediction, force, weight, &
+                            work, row)
          end associate
       end associate
       row%value = sum(weight*work)
@@ -182,5 +187,23 @@ contains
       if (by_energy) return
       where (mu > 0.0_wp) row%by_friction = -weight*work/mu
    end subroutine set_work
+
+   !> What the mean forces do on sides that slide.
+   subroutine add_speeds(state, prediction, force, weight, work, row)
+      type(balance_state), intent(in) :: state
+      type(prediction_type), intent(in) :: prediction
+      real(wp), intent(in) :: force(:, :, :), weight(:)
+      real(wp), intent(inout) :: work(:)
+      type(response_row), intent(inout) :: row
+      real(wp) :: way(size(work))
+      integer :: c
+
+      if (.not. (allocated(prediction%speed) .and. state%problem%fourier%has_constant())) return
+      do c = 1, 2
+         way = 2.0_wp*pi/state%frequency()*prediction%speed(:, c)
+         work = work - way*force(:, c, 1)
+         row%by_force(:, c, 1) = row%by_force(:, c, 1) - weight*way
+      end do
+   end subroutine add_speeds
 
 end module fw_response_rows

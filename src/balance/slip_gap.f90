@@ -63,6 +63,7 @@ contains
          if (.not. p%takes_balance) return
          do i = 1, problem%n_pairs
             call judge_mass(system, i, governs, is_massive)
+            if (p%drags(i)) cycle
             if (knows_tail(p, i) .or. .not. governs .or. .not. p%takes(i)) cycle
             if (is_massive) most = limit
             call add_pair(system, size(system%balance, 1), x, i, done, possible, slip, size_of_slip)

@@ -6,7 +6,7 @@ module fw_stability_history
    use fw_friction, only: elastic_friction
    use fw_instant_law, only: element_motion, instant_law, reserve_motion
    use fw_balance_state, only: balance_state
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_pair_law, only: pair_law
    use fw_stability_tangent, only: relative_displacements
    implicit none (type, external)
@@ -87,7 +87,13 @@ contains
             do c = 1, 3
                if (self%row(c, i) == 0) cycle
                self%stiffness(self%row(c, i)) = p%stiffness(i, c)
-               self%forces%prediction(i, c, :) = p%stiffness(i, c)*rows(:, self%row(c, i))
+               self%forces%prediction(i, c, :) = rows(:, self%row(c, i))
+            end do
+         end do
+         call p%move_gaps(fourier, self%forces%prediction)
+         do c = 1, 3
+            do i = 1, size(self%forces%prediction, 1)
+               self%forces%prediction(i, c, :) = p%stiffness(i, c)*self%forces%prediction(i, c, :)
             end do
          end do
       end associate
@@ -132,7 +138,7 @@ contains
       type(history_type), intent(inout) :: self
       real(wp) :: u(self%n_time, size(rows, 2)), v(self%n_time, size(rows, 2))
       real(wp) :: rates(size(rows, 1), size(rows, 2))
-      real(wp) :: here(3), moves(3), force(3), slope(3, 3)
+      real(wp) :: here(3), moves(3), force(3), slope(3, 3), depth
       integer :: c, i, k, n
 
       self%acts_at_once = .true.
@@ -153,8 +159,10 @@ contains
                   here(c) = u(k, self%row(c, i))
                   moves(c) = v(k, self%row(c, i))
                end do
-               call self%law%at_instant(i, self%law%input_at(i, here, moves, system%depth(i)), &
-                                        force, slope)
+               depth = system%depth(i)
+               if (allocated(p%gap_motion)) depth = depth + &
+                  p%gap_motion%at_angle(i, 2.0_wp*pi*real(k - 1, wp)/self%n_time)
+               call self%law%at_instant(i, self%law%input_at(i, here, moves, depth), force, slope)
                do c = 1, 3
                   if (p%order_of(i, c) > 0) then
                      self%by_velocity(:, c, i, k) = slope(c, :)*p%stiffness(i, c)

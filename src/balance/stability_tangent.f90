@@ -129,6 +129,7 @@ contains
             ! Those with friction are stuck or open throughout: add_stuck has the former.
             if (row == 0 .or. has_friction(system, i)) cycle
             gap = rows(:, row)
+            if (allocated(p%gap_motion)) call p%gap_motion%add_to_row(i, gap)
             ! Negative where the pair is pressed: wear opens it.
             gap(1) = gap(1) + p%gap(i) + system%depth(i)
             ! Harmonics above 2 H' of the slope couple nothing.

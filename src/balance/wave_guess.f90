@@ -140,8 +140,7 @@ contains
       complex(wp), intent(inout) :: force(:), q(:)
       logical, intent(out) :: held(:)
       integer :: i, c, j, row, n_held(size(held))
-      real(wp) :: gap
-      complex(wp) :: own
+      complex(wp) :: gap, own
 
       allocate (slope(size(system%problem%joint%cyclic%coordinate)), source=(0.0_wp, 0.0_wp))
       n_held = 0

@@ -34,6 +34,8 @@ module fw_features
       matrices_alone = 'coriolis, structural damping, air or unsymmetric matrices', &
       hysteretic = 'structural damping (loss_factor) or forces of the air', &
       stress = 'stress (group &stress, /stress of the model file)', &
+      moving_gaps = 'gaps in harmonics (contact%n_gap_terms, /contact/gap_harmonic)', &
+      sliding_side = 'a side 2 that slides (contact%speed_1, speed_2)', &
       growing_stability = 'sweep%stability = .true. where gaps or normal loads grow', &
       of_air = 'forces of the air', &
       of_campbell = "case%analysis = 'campbell'", &
@@ -249,6 +251,11 @@ contains
          asked = has_states(case)
       case ("contact%memory = 'carried'")
          asked = pairs .and. case%contact%memory == memory_carried
+      case (moving_gaps)
+         asked = pairs .and. case%contact%highest_gap() > 0
+      case (sliding_side)
+         asked = pairs
+         if (pairs) asked = case%contact%slides() .and. .not. facts%acts_at_once
       case ('pairs with two tangential directions')
          asked = has_two_tangents(case)
       case ('a law of velocities, whose pairs do not stick')

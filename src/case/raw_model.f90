@@ -208,6 +208,12 @@ contains
                         'side 1'), pairs%sector_2)
       call to%bind(part('contact/mu', each, 'friction coefficient'), pairs%mu)
       call to%bind(part('contact/gap', each, 'initial gap; negative: interference'), pairs%gap)
+      call to%bind(part('contact/gap_harmonic', 'gap', 'harmonics 0, 1, .. that an obstacle adds '// &
+                        'to the gaps'), pairs%gap_harmonic)
+      call to%bind(part('contact/gap_cosine', 'gap pair', 'their cosine parts, which open', &
+                        storage=by_columns), pairs%gap_cosine)
+      call to%bind(part('contact/gap_sine', 'gap pair', 'their sine parts', storage=by_columns), &
+                   pairs%gap_sine)
       call to%bind(part('contact/area', each, 'of a pair'), pairs%area)
       call to%bind(part('contact/normal_load', each, 'constant compressive force of pairs '// &
                         'without a normal dof'), pairs%normal_load)
@@ -226,6 +232,7 @@ contains
       laws = part('contact/law', 'pair', 'in its place the law of each pair')
       call to%bind(laws, words)
       if (allocated(words)) call take_laws(laws, words, to, pairs)
+      call to%note('text', part('contact@sliding', '', 'how friction follows speed_1, speed_2'))
       call bind_normal_laws(pairs, to)
       call to%bind(part('contact/position', 'pair 3', 'coordinates, for pictures', &
                         storage=by_columns), pairs%position)

@@ -7,7 +7,7 @@ module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_features, only: growing_stability, asks_for, feature_length, feature_text, hysteretic, &
-      matrices_alone, of_air, of_campbell, of_population, stress
+      matrices_alone, moving_gaps, of_air, of_campbell, of_population, sliding_side, stress
    implicit none (type, external)
    private
 
@@ -184,6 +184,14 @@ module fw_rules
       rule_type('sweep%stability = .true.', 'a law without Floquet multipliers', &
                 "use contact%law = 'penalty'")]
 
+   !> Obstacles that move drive the vibration, and are no part of a perturbation.
+   type(rule_type), parameter :: of_obstacles(*) = [ &
+      rule_type("case%analysis = 'mode'", moving_gaps, &
+                'a mode is a motion without excitation: leave them out'), &
+      rule_type("case%analysis = 'mode'", sliding_side, &
+                'a mode is a motion without excitation: leave the speeds out'), &
+      rule_type('sweep%stability = .true.', sliding_side, 'leave stability out')]
+
    !> Loads of supports are those of stiffness, damping and mass.
    type(rule_type), parameter :: of_base(*) = [ &
       rule_type('group &base', of_air, 'give the load that the base makes')]
@@ -231,7 +239,8 @@ module fw_rules
 
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
                                              of_matrices, of_laws, of_base, of_elements, of_wear, &
-                                             of_derivatives, of_stress, of_diagrams]
+                                             of_derivatives, of_stress, of_diagrams, &
+                                             of_obstacles]
 
 contains
 

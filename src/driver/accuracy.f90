@@ -96,7 +96,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics, &
-                                         case%model%waves%highest())
+                                         max(case%model%waves%highest(), &
+                                             case%contact%highest_gap()))
       allocate (self%level(size(self%n_harmonics), fewest:limits%most_doublings))
       allocate (self%tail(size(self%n_harmonics), fewest:limits%most_doublings))
       allocate (self%by_instants(size(self%n_harmonics), fewest:limits%most_doublings), &

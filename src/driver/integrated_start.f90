@@ -87,7 +87,7 @@ contains
       class(case_type), allocatable, intent(out) :: fast
 
       allocate (fast, source=case)
-      fast%harmonics%n_harmonics = max(1, case%model%waves%highest())
+      fast%harmonics%n_harmonics = max(1, case%model%waves%highest(), case%contact%highest_gap())
       fast%solver%fallback = .false.
       fast%solver%tolerance = close_enough
       fast%time%n_periods = few_periods

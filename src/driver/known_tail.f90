@@ -333,6 +333,7 @@ contains
       point%force = whole%force(:, :, :n)
       call move_alloc(whole%fraction, point%fraction)
       call move_alloc(whole%dissipation, point%dissipation)
+      call move_alloc(whole%obstacle_work, point%obstacle_work)
    end subroutine take
 
    !> Whether the structure just above H is what a rigid law takes it for, within a factor of two

@@ -145,7 +145,8 @@ contains
       lower = 0
       done = .false.
       most = case%harmonics%n_harmonics
-      ladder = harmonic_levels(most, case%model%waves%highest())
+      ladder = harmonic_levels(most, max(case%model%waves%highest(), &
+                                         case%contact%highest_gap()))
       upper = most
       do k = 1, size(ladder) - 1
          if (work >= most_work) exit

@@ -235,6 +235,8 @@ contains
       if (allocated(case%model%load_wave)) then
          is_shaken = is_shaken .or. any(abs(case%model%load_wave) > 0.0_wp)
       end if
+      ! An obstacle that moves shakes, too.
+      is_shaken = is_shaken .or. case%contact%highest_gap() > 0
    end function is_shaken
 
    !> Whether nothing but its contact could damp the structure.

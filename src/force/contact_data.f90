@@ -13,9 +13,12 @@ module fw_contact_data
 
    public :: contact_type, spring_type
    public :: memory_words, memory_assembly, memory_carried
+   public :: sliding_words, sliding_path, sliding_steady
 
    character(*), parameter :: memory_words(*) = [character(8) :: 'assembly', 'carried']
    integer, parameter :: memory_assembly = 1, memory_carried = 2
+   character(*), parameter :: sliding_words(*) = [character(6) :: 'path', 'steady']
+   integer, parameter :: sliding_path = 1, sliding_steady = 2
 
    !> Contact pairs (group &contact, /contact of a model file).
    type :: contact_type
@@ -35,6 +38,12 @@ module fw_contact_data
       real(wp), allocatable :: mu(:)
       !> Initial gap, negative for an interference [length] (n_pairs).
       real(wp), allocatable :: gap(:)
+      !> What an obstacle that moves adds to the gap in harmonics of the response, above 0: these
+      !> (n_harmonics), and their cosine and sine parts [length] (n_pairs, n_harmonics).
+      integer, allocatable :: gap_harmonic(:)
+      real(wp), allocatable :: gap_cosine(:, :), gap_sine(:, :)
+      !> How friction follows a side 2 that moves: `speed_1`, `speed_2` of the constants.
+      integer :: sliding = sliding_path
       !> Wear depth that the joint starts with, on top of the gap [length] (n_pairs); none where it
       !> is not allocated.
       real(wp), allocatable :: depth(:)
@@ -75,6 +84,11 @@ module fw_contact_data
    contains
       procedure :: turn
       procedure :: has_growth
+      procedure :: add_gap
+      procedure :: highest_gap
+      procedure :: speeds
+      procedure :: slides
+      procedure :: moves_obstacle
       procedure :: level => level_sectors
    end type contact_type
 
@@ -120,6 +134,69 @@ contains
       call level_values(self%n_alike, self%normal_stiffness)
       call self%constants%level(self%n_alike)
    end subroutine level_sectors
+
+   !> Add to the gaps of all pairs in one harmonic; 0 is the gap itself.
+   pure subroutine add_gap(self, harmonic, cosine, sine)
+      class(contact_type), intent(inout) :: self
+      integer, intent(in) :: harmonic
+      !> (n_pairs) [length].
+      real(wp), intent(in) :: cosine(:), sine(:)
+      real(wp), allocatable :: wider(:, :, :)
+      integer :: k, n
+
+      if (harmonic == 0) then
+         self%gap = self%gap + cosine
+         return
+      end if
+      if (.not. allocated(self%gap_harmonic)) then
+         allocate (self%gap_harmonic(0))
+         allocate (self%gap_cosine(self%n_pairs, 0), self%gap_sine(self%n_pairs, 0))
+      end if
+      n = size(self%gap_harmonic)
+      k = findloc(self%gap_harmonic, harmonic, dim=1)
+      if (k == 0) then
+         allocate (wider(self%n_pairs, n + 1, 2), source=0.0_wp)
+         wider(:, :n, 1) = self%gap_cosine
+         wider(:, :n, 2) = self%gap_sine
+         k = n + 1
+         self%gap_harmonic = [self%gap_harmonic, harmonic]
+         self%gap_cosine = wider(:, :, 1)
+         self%gap_sine = wider(:, :, 2)
+      end if
+      self%gap_cosine(:, k) = self%gap_cosine(:, k) + cosine
+      self%gap_sine(:, k) = self%gap_sine(:, k) + sine
+   end subroutine add_gap
+
+   !> The highest harmonic of the gaps; 0 where they stand still.
+   pure integer function highest_gap(self) result(highest)
+      class(contact_type), intent(in) :: self
+
+      highest = 0
+      if (allocated(self%gap_harmonic)) highest = maxval([0, self%gap_harmonic])
+   end function highest_gap
+
+   !> Whether gaps have harmonics, or a side 2 slides.
+   pure logical function moves_obstacle(self)
+      class(contact_type), intent(in) :: self
+
+      moves_obstacle = self%highest_gap() > 0 .or. self%slides()
+   end function moves_obstacle
+
+   !> Whether a side 2 slides.
+   pure logical function slides(self)
+      class(contact_type), intent(in) :: self
+
+      slides = any(abs(self%speeds()) > 0.0_wp)
+   end function slides
+
+   !> Velocities of side 2 along t1 and t2 [length/time] (n_pairs, 2).
+   pure function speeds(self) result(v)
+      class(contact_type), intent(in) :: self
+      real(wp) :: v(self%n_pairs, 2)
+
+      v(:, 1) = self%constants%get('speed_1', self%n_pairs)
+      v(:, 2) = self%constants%get('speed_2', self%n_pairs)
+   end function speeds
 
    !> Whether gaps or normal loads depend on the rotation speed.
    pure logical function has_growth(self)

@@ -13,6 +13,7 @@ module fw_force_law
    use fw_displacement_path, only: displacement_path
    use fw_fft, only: fft_type
    use fw_fourier, only: fourier_type
+   use fw_gap_motion, only: gap_motion
    use fw_kinds, only: wp
    use fw_march_derivative, only: march_derivative
    implicit none (type, external)
@@ -64,9 +65,17 @@ module fw_force_law
       !> What is added to them for each square of the frequency, where a rotation speed follows it;
       !> not allocated elsewhere (n_elements).
       real(wp), allocatable :: gap_growth(:), load_growth(:)
+      !> What the gaps have in harmonics of the response; not allocated where they stand still.
+      type(gap_motion), allocatable :: gap_motion
+      !> Velocities of side 2 along t1 and t2, where the anchors of elements that stick are carried
+      !> along (n_elements, 2) [length/time]; not allocated elsewhere.
+      real(wp), allocatable :: speed(:, :)
    contains
       procedure :: gap_at
       procedure :: load_at
+      procedure :: move_gaps
+      procedure :: gap_swing
+      procedure :: drags
       procedure :: grows
       procedure :: order_of
       procedure :: in_time
@@ -434,6 +443,35 @@ contains
       gap_at = self%gap(element)
       if (allocated(self%gap_growth)) gap_at = gap_at + omega**2*self%gap_growth(element)
    end function gap_at
+
+   !> Add what the gaps have in harmonics to the coefficients of the relative displacements, before
+   !> these become inputs.
+   pure subroutine move_gaps(self, fourier, u)
+      class(prediction_type), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      !> (n_elements, n_components, n_coefficients) [length].
+      real(wp), intent(inout) :: u(:, :, :)
+
+      if (allocated(self%gap_motion)) call self%gap_motion%add_to(fourier, u(:, size(u, 2), :))
+   end subroutine move_gaps
+
+   !> How far gaps depart from their constants at most (n_elements) [length].
+   pure function gap_swing(self) result(swing)
+      class(prediction_type), intent(in) :: self
+      real(wp) :: swing(size(self%gap))
+
+      swing = 0.0_wp
+      if (allocated(self%gap_motion)) swing = self%gap_motion%swing()
+   end function gap_swing
+
+   !> Whether side 2 of an element takes its anchor along.
+   elemental logical function drags(self, element)
+      class(prediction_type), intent(in) :: self
+      integer, intent(in) :: element
+
+      drags = .false.
+      if (allocated(self%speed)) drags = any(abs(self%speed(element, :)) > 0.0_wp)
+   end function drags
 
    !> The dead load of an element at a frequency [rad/s].
    elemental real(wp) function load_at(self, element, omega)

@@ -12,9 +12,9 @@ module fw_friction
    use fw_fourier, only: fourier_type
    use fw_friction_events, only: follow_events
    use fw_key, only: key_visitor
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_normal_law, only: bind_normal_constants, curved_pairs
-   use fw_pair_law, only: normal_stiffness_key, pair_law, tangential_stiffness_key
+   use fw_pair_law, only: bind_speeds, normal_stiffness_key, pair_law, tangential_stiffness_key
    use fw_sampled_turn, only: settle_samples
    use fw_settling, only: periodic_tolerance, shakedown_turns
    use fw_slip, only: slip_work
@@ -112,6 +112,7 @@ contains
       type(contact_type), intent(inout) :: contact
       logical, intent(in) :: slides, closes
 
+      call bind_speeds(keys, contact)
       if (self%prediction%takes_balance) return
       call contact%constants%bind(keys, tangential_stiffness_key(), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
@@ -123,6 +124,8 @@ contains
       type(contact_type), intent(in) :: contact
       integer :: i
 
+      call self%take_speeds(contact)
+      call self%take_facts(contact)
       if (self%prediction%takes_balance) return
       do i = 1, self%n_elements
          ! One stiffness for both tangential directions: friction prefers no direction either.
@@ -130,15 +133,20 @@ contains
             contact%tangential_stiffness(i)
       end do
       call self%take_normal(contact)
-      call self%take_facts(contact)
    end subroutine take_constants
 
    !> Pressure along a curve is taken at instants, and has no polynomial pieces between events.
-   !> Perturbations and motions in time know it where nothing rubs.
+   !> Perturbations and motions in time know it where nothing rubs. Anchors that are carried along
+   !> are so from instant to instant.
    subroutine take_facts(self, contact)
       class(friction_law), intent(inout) :: self
       type(contact_type), intent(in) :: contact
 
+      if (contact%slides()) then
+         self%facts%is_odd = .false.
+         self%facts%has_events = .false.
+         self%facts%has_multipliers = .false.
+      end if
       if (self%prediction%takes_balance .or. .not. any(curved_pairs(contact))) return
       call self%note_curves(contact)
       self%facts%has_events = .false.
@@ -211,6 +219,7 @@ contains
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
       call self%take_pressures(work)
+      if (allocated(self%prediction%speed)) call enter_frame(self, fourier%n_time, work)
       ! Before the march: what counts as repeated is relative to the largest prediction.
       call work%measure_scale()
       n_blocks = (self%n_elements + block_size - 1)/block_size
@@ -256,6 +265,8 @@ contains
       call march(self, work, room, fourier%n_time, first, last)
       if (self%facts%remembers .or. .not. fourier%has_constant()) return
       do pair = first, last
+         ! On a side that slides nothing comes to rest.
+         if (self%prediction%drags(pair)) cycle
          call lead_to_rest(self, work, room, fourier%n_time, pair)
       end do
    end subroutine follow_block
@@ -324,7 +335,7 @@ contains
       type(force_workspace), intent(inout) :: work
       type(friction_room), intent(inout) :: room
       integer, intent(in) :: n_time, first, last
-      integer :: turn
+      integer :: i
 
       ! The start is stated, never left from before: a residual must not depend on the one before
       ! it.
@@ -340,6 +351,27 @@ contains
          work%turns(first:last) = 1
          return
       end if
+      if (any(self%prediction%drags([(i, i=first, last)]))) then
+         do i = first, last
+            if (self%prediction%drags(i)) then
+               call march_along(self, work, room, n_time, i)
+            else
+               call march_to_limit(self, work, room, n_time, i, i)
+            end if
+         end do
+         return
+      end if
+      call march_to_limit(self, work, room, n_time, first, last)
+   end subroutine march
+
+   !> From the stated start to where a turn repeats.
+   subroutine march_to_limit(self, work, room, n_time, first, last)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer, intent(in) :: n_time, first, last
+      integer :: turn
+
       work%turns(first:last) = 0
       do turn = 1, plain_turns
          call march_turn(self, work, room, n_time, first, last, turn)
@@ -351,7 +383,88 @@ contains
       call march_turn(self, work, room, n_time, first, last, plain_turns + 1)
       ! Not settled: the derivative carries as many turns as are worth their cost.
       where (work%turns(first:last) == 0) work%turns(first:last) = shakedown_turns
-   end subroutine march
+   end subroutine march_to_limit
+
+   !> The predictions in a frame that slides with side 2: anchors stand there where a pair sticks,
+   !> and from turn to turn they go on by what the frame has moved in a period. Predictions from
+   !> velocities take the relative one.
+   subroutine enter_frame(self, n_time, work)
+      class(friction_law), intent(in) :: self
+      integer, intent(in) :: n_time
+      type(force_workspace), intent(inout) :: work
+      real(wp) :: drift
+      integer :: c, i, k
+
+      do c = 1, 2
+         do i = 1, self%n_elements
+            if (.not. self%prediction%drags(i)) cycle
+            drift = frame_drift(self, work%rate, i, c)
+            do k = 1, n_time
+               work%prediction_time(i, c, k) = work%prediction_time(i, c, k) - &
+                  drift*merge(real(k, wp)/real(n_time, wp), 0.5_wp/pi, self%facts%remembers)
+            end do
+         end do
+      end do
+   end subroutine enter_frame
+
+   !> What the frame of a pair moves in a period, times the stiffness [force]; nothing at rest.
+   pure real(wp) function frame_drift(self, omega, pair, component) result(drift)
+      class(friction_law), intent(in) :: self
+      real(wp), intent(in) :: omega
+      integer, intent(in) :: pair, component
+
+      drift = 0.0_wp
+      if (omega > 0.0_wp) drift = 2.0_wp*pi/omega*self%prediction%stiffness(pair, component)* &
+                                  self%prediction%speed(pair, component)
+   end function frame_drift
+
+   !> A pair whose anchor is carried along has one limit, since it cannot stick for ever. It is
+   !> looked for from an anchor far ahead, where friction has always pulled it back: with one
+   !> direction a turn leads from there to the limit.
+   subroutine march_along(self, work, room, n_time, pair)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer, intent(in) :: n_time, pair
+      real(wp) :: drift(2), start(2), far, x(2)
+      integer :: k, turn
+
+      drift = [frame_drift(self, work%rate, pair, 1), frame_drift(self, work%rate, pair, 2)]
+      far = 0.0_wp
+      do k = 1, n_time
+         associate (y => work%prediction_time)
+            far = max(far, abs(y(pair, 1, k)) + abs(y(pair, 2, k)) + &
+                           work%mu(pair)*abs(y(pair, 3, k)))
+         end associate
+      end do
+      far = norm2(drift) + 2.0_wp*far
+      start = 0.0_wp
+      if (norm2(drift) > 0.0_wp) start = drift/norm2(drift)*far
+      work%x(pair, :) = start
+      do turn = 1, plain_turns
+         start = work%x(pair, :)
+         call march_turn(self, work, room, n_time, pair, pair, 1)
+         work%x(pair, :) = work%x(pair, :) + drift
+         work%drift(pair) = maxval(abs(work%x(pair, :) - start))
+         if (work%drift(pair) <= periodic_tolerance*(work%scale(pair) + norm2(drift))) exit
+      end do
+      if (turn > plain_turns) then
+         x = work%x(pair, :)
+         call settle_samples(self%n_elements, n_time, pair, work%prediction_time, work%mu(pair), &
+                             work%scale(pair) + norm2(drift), periodic_tolerance, x, &
+                             room%settled(pair), drift)
+         work%x(pair, :) = x
+         start = x
+         call march_turn(self, work, room, n_time, pair, pair, 1)
+         work%x(pair, :) = work%x(pair, :) + drift
+         work%drift(pair) = maxval(abs(work%x(pair, :) - start))
+      end if
+      room%settled(pair) = .true.
+      ! Its start is where the derivative of a turn begins.
+      work%turns(pair) = 1
+      ! It slips in every period.
+      room%margin(pair) = min(room%margin(pair), -tiny(1.0_wp))
+   end subroutine march_along
 
    !> One turn, and which pairs repeat after it.
    subroutine march_turn(self, work, room, n_time, first, last, turn)

@@ -287,7 +287,13 @@ contains
                               work%mu(pair), touch*work%scale(pair), z, unique, of_pair%inverse, &
                               of_pair%by_start)
       end if
-      if (.not. unique) x = work%x_start(pair, :)
+      if (self%prediction%drags(pair) .and. self%facts%remembers) then
+         ! The only limit, which one direction forgets its start for.
+         x = work%x(pair, :)
+         unique = unique .or. count(self%present(1:2, pair)) < 2
+      else if (.not. unique) then
+         x = work%x_start(pair, :)
+      end if
    end subroutine find_start
 
    !> Of any pair, by the rows of the march.

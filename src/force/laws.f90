@@ -2,15 +2,16 @@
 !> own. Pairs of one case may have different ones.
 module fw_laws
    use fw_bouc_wen, only: bouc_wen_friction
-   use fw_contact_data, only: contact_type
+   use fw_contact_data, only: contact_type, sliding_path, sliding_steady
    use fw_force_law, only: law_facts
    use fw_friction, only: elastic_friction, rigid_friction, rigid_friction_of_rates
+   use fw_kinds, only: wp
    use fw_iwan, only: iwan_friction
    use fw_normal_law, only: curved_pairs
    use fw_pair_law, only: pair_law
    use fw_regularised, only: regularised_friction
    use fw_rigid_law, only: friction_of_high_order
-   use fw_several_laws, only: common_facts, several_laws
+   use fw_several_laws, only: common_facts, lean_facts, several_laws
    implicit none (type, external)
    private
 
@@ -51,12 +52,15 @@ contains
       class(pair_law), allocatable, intent(out) :: law
       class(pair_law), allocatable :: member
       type(several_laws), allocatable :: all
+      real(wp) :: speed(contact%n_pairs, 2)
       integer :: group(contact%n_pairs)
       integer, allocatable :: pair(:)
       integer :: i, k
 
       group = groups_of(contact)
-      if (maxval([group, 1]) == 1) then
+      speed = 0.0_wp
+      if (contact%sliding == sliding_steady) speed = contact%speeds()
+      if (maxval([group, 1]) == 1 .and. .not. any(abs(speed) > 0.0_wp)) then
          call new_law(contact%law, law)
          call law%build(contact, present)
          return
@@ -65,24 +69,46 @@ contains
       do k = 1, maxval(group)
          pair = pack([(i, i=1, size(group))], group == k)
          call new_law(law_of_pair(contact, pair(1)), member)
-         call member%build(part_of(contact, pair), present(:, pair))
+         if (any(abs(speed(pair(1), :)) > 0.0_wp)) then
+            ! What presses alone; friction follows from it.
+            call member%build(without_friction(part_of(contact, pair)), &
+                              present(:, pair) .and. spread([.false., .false., .true.], 2, &
+                                                            size(pair)))
+         else
+            call member%build(part_of(contact, pair), present(:, pair))
+         end if
          call all%add(member, pair)
       end do
-      call all%join(present)
+      call all%join(present, contact%mu, speed)
       call move_alloc(all, law)
    end subroutine build_law
 
+   !> Pairs that press and do not rub.
+   type(contact_type) function without_friction(contact) result(smooth)
+      type(contact_type), intent(in) :: contact
+
+      smooth = contact
+      smooth%mu = 0.0_wp
+      if (allocated(smooth%worn_friction)) deallocate (smooth%worn_friction)
+      call smooth%constants%set('speed_1', spread(0.0_wp, 1, contact%n_pairs))
+      call smooth%constants%set('speed_2', spread(0.0_wp, 1, contact%n_pairs))
+   end function without_friction
+
    !> Pairs that one law is built for have one number, in the order of their first pairs: those with
-   !> the same word, and of them those whose pressure is a curve (n_pairs).
+   !> the same word, and of them those whose pressure is a curve, and those on a side that slides
+   !> steadily (n_pairs).
    pure function groups_of(contact) result(group)
       type(contact_type), intent(in) :: contact
       integer :: group(contact%n_pairs)
-      logical :: curved(contact%n_pairs)
+      logical, dimension(contact%n_pairs) :: curved, steady
       integer :: code(contact%n_pairs)
       integer :: first, i, n
 
       curved = curved_pairs(contact)
-      code = [(2*law_of_pair(contact, i) + merge(1, 0, curved(i)), i=1, size(code))]
+      steady = .false.
+      if (contact%sliding == sliding_steady) steady = any(abs(contact%speeds()) > 0.0_wp, dim=2)
+      code = [(4*law_of_pair(contact, i) + merge(2, 0, steady(i)) + merge(1, 0, curved(i)), &
+               i=1, size(code))]
       n = 0
       do i = 1, size(code)
          first = findloc(code, code(i), dim=1)
@@ -133,12 +159,18 @@ contains
       part%n_pairs = size(pair)
       part%penalty_scale = contact%penalty_scale
       part%memory = contact%memory
+      part%sliding = contact%sliding
       part%side_1 = contact%side_1(:, pair)
       part%side_2 = contact%side_2(:, pair)
       part%mu = contact%mu(pair)
       if (allocated(contact%worn_friction)) part%worn_friction = &
          contact%worn_friction%of_pairs(pair)
       part%gap = contact%gap(pair)
+      if (allocated(contact%gap_harmonic)) then
+         part%gap_harmonic = contact%gap_harmonic
+         part%gap_cosine = contact%gap_cosine(pair, :)
+         part%gap_sine = contact%gap_sine(pair, :)
+      end if
       part%normal_load = contact%normal_load(pair)
       part%speed_order = contact%speed_order
       if (allocated(contact%gap_rotation)) part%gap_rotation = contact%gap_rotation(pair)
@@ -189,7 +221,12 @@ contains
          part%constants = contact%constants%of_pairs(pair)
          part%mu = contact%mu(pair)
          call take_normal_part(contact, pair, part)
-         each(k) = facts_of_law(law_of_pair(contact, pair(1)), part)
+         if (contact%sliding == sliding_steady .and. part%slides()) then
+            each(k) = facts_of_law(law_of_pair(contact, pair(1)), without_friction(part))
+            call lean_facts(each(k))
+         else
+            each(k) = facts_of_law(law_of_pair(contact, pair(1)), part)
+         end if
       end do
       facts = each(1)
       if (size(each) > 1) facts = common_facts(each)
@@ -299,6 +336,8 @@ contains
 
       number = contact%law
       if (contact%n_pairs == 0 .or. by_instants .or. allocated(contact%law_of)) return
+      ! That law carries no anchors along.
+      if (contact%slides() .and. contact%sliding == sliding_path) return
       ! Two directions are solved by the displacement law only.
       if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1))) return
       number = law_with_tail(number)

@@ -4,6 +4,7 @@ module fw_pair_law
    use fw_contact_data, only: contact_type
    use fw_force_law, only: prediction_type, force_law, force_workspace
    use fw_fourier, only: fourier_type
+   use fw_gap_motion, only: take_gap_motion
    use fw_key, only: key, key_type, key_visitor
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
@@ -13,7 +14,7 @@ module fw_pair_law
    implicit none (type, external)
    private
 
-   public :: pair_law, normal_stiffness_key, tangential_stiffness_key
+   public :: pair_law, bind_speeds, normal_stiffness_key, tangential_stiffness_key
 
    type, abstract, extends(force_law) :: pair_law
       !> Friction coefficient (n_elements).
@@ -31,6 +32,7 @@ module fw_pair_law
       procedure :: take_facts
       procedure :: take_pairs
       procedure :: take_normal
+      procedure :: take_speeds
       procedure :: note_curves
       procedure :: reserve
       procedure :: reserve_normal
@@ -72,6 +74,7 @@ contains
                         contact%side_2(3, :) == 0)
       end associate
       call take_growth(contact, self%prediction)
+      call take_gap_motion(contact, self%prediction%gap_motion)
       call self%take_constants(contact)
    end subroutine build
 
@@ -116,6 +119,27 @@ contains
                                      at_least(0.0_wp), 'F/L', 'n_pairs', &
                                      absent='of the file, else required with tangential dofs')
    end function tangential_stiffness_key
+
+   !> The keys of a side 2 that slides, which several laws have.
+   subroutine bind_speeds(keys, contact)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+
+      call contact%constants%bind(keys, key('speed_1', 'velocity of side 2 along t1: a belt, a '// &
+         'disk or a casing', unit='L/s', shape='n_pairs', absent='of the file, else 0'), .false.)
+      call contact%constants%bind(keys, key('speed_2', 'the same along t2', unit='L/s', &
+         shape='n_pairs', absent='of the file, else 0'), .false.)
+   end subroutine bind_speeds
+
+   !> The velocities of side 2, where it slides.
+   pure subroutine take_speeds(self, contact)
+      class(pair_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+
+      if (.not. contact%slides()) return
+      self%prediction%speed = contact%speeds()
+      where (.not. transpose(self%present(1:2, :))) self%prediction%speed = 0.0_wp
+   end subroutine take_speeds
 
    !> Take what `bind_keys` declared, once the pairs are there.
    subroutine take_constants(self, contact)
@@ -335,7 +359,9 @@ contains
       integer, intent(in) :: element, component
 
       slope = merge(1.0_wp, 0.0_wp, self%present(component, element))
-      if (component < 3 .and. .not. self%mu(element) > 0.0_wp) slope = 0.0_wp
+      if (component == 3) return
+      ! Nor does one whose other side slides.
+      if (.not. self%mu(element) > 0.0_wp .or. self%prediction%drags(element)) slope = 0.0_wp
    end function slope_at_rest
 
    !> The same law with its paths followed from event to event; not allocated where `facts` know of

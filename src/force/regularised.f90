@@ -17,7 +17,7 @@ module fw_regularised
    use fw_kinds, only: wp
    use fw_normal_law, only: bind_normal_constants
    use fw_lapack, only: dgemm
-   use fw_pair_law, only: normal_stiffness_key, pair_law
+   use fw_pair_law, only: bind_speeds, normal_stiffness_key, pair_law
    implicit none (type, external)
    private
 
@@ -103,11 +103,8 @@ contains
             absent='of the file, else 1'), .false.)
          call constants%bind(keys, key('mu_viscous', 'what mu gains with the sliding speed', &
             at_least(0.0_wp), 's/L', 'n_pairs', absent='of the file, else 0'), .false.)
-         call constants%bind(keys, key('speed_1', 'velocity of side 2 along t1: a belt or a disk', &
-            unit='L/s', shape='n_pairs', absent='of the file, else 0'), .false.)
-         call constants%bind(keys, key('speed_2', 'the same along t2', unit='L/s', &
-            shape='n_pairs', absent='of the file, else 0'), .false.)
       end associate
+      call bind_speeds(keys, contact)
    end subroutine bind_keys
 
    !> Pairs without weakening.
@@ -151,6 +148,7 @@ contains
       end associate
       call self%take_normal(contact)
       call take_sliding(self, contact)
+      call self%take_speeds(contact)
       call self%take_facts(contact)
    end subroutine take_constants
 

@@ -17,7 +17,9 @@ module fw_rigid_law
    use fw_kinds, only: wp
    use fw_oscillator, only: new_oscillator
    use fw_oscillator_pair, only: oscillator_pair_type
-   use fw_pair_law, only: pair_law
+   use fw_key, only: key_visitor
+   use fw_contact_data, only: contact_type
+   use fw_pair_law, only: bind_speeds, pair_law
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private
@@ -26,6 +28,7 @@ module fw_rigid_law
 
    type, extends(friction_by_events) :: rigid_law
    contains
+      procedure :: bind_keys
       procedure :: reserve
       procedure :: evaluate
       procedure :: linearize
@@ -58,6 +61,18 @@ contains
                             needs_projection=.true., has_tail=.true., measures_slip=.true., &
                             is_integrated=.true.)
    end function friction_of_high_order
+
+   !> What presses may slide steadily; an anchor that moves has no closed form here.
+   subroutine bind_keys(self, keys, contact, slides, closes)
+      class(rigid_law), intent(in) :: self
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      logical, intent(in) :: slides, closes
+
+      call bind_speeds(keys, contact)
+      associate (unused => self, unused_slides => slides, unused_closes => closes)
+      end associate
+   end subroutine bind_keys
 
    !> Room; the masses are known.
    subroutine reserve(self, fourier, work)

@@ -14,6 +14,8 @@ module fw_sampled_turn
       real(wp) :: mu = 0.0_wp
       !> Predicted forces (pair, component, instant).
       real(wp), pointer :: y(:, :, :) => null()
+      !> What the anchor goes on by from turn to turn.
+      real(wp) :: drift(2) = 0.0_wp
    contains
       procedure :: turn
    end type sampled_map
@@ -21,7 +23,7 @@ module fw_sampled_turn
 contains
 
    !> From a position to the limit of the turns that follow.
-   subroutine settle_samples(n_pairs, n_time, pair, y, mu, scale, tolerance, x, done)
+   subroutine settle_samples(n_pairs, n_time, pair, y, mu, scale, tolerance, x, done, drift)
       integer, intent(in) :: n_pairs, n_time, pair
       !> Predicted forces, friction coefficient, size of the tangential forces of the pair.
       real(wp), intent(in), target :: y(n_pairs, 3, n_time)
@@ -31,11 +33,15 @@ contains
       !> Corrected position [force].
       real(wp), intent(inout) :: x(2)
       logical, intent(out) :: done
+      !> What the anchor goes on by from turn to turn, in the frame of a side that slides
+      !> (default: nothing).
+      real(wp), intent(in), optional :: drift(2)
       type(sampled_map) :: map
 
       map%pair = pair
       map%mu = mu
       map%y => y
+      if (present(drift)) map%drift = drift
       call settle(map, scale, tolerance, x, done)
    end subroutine settle_samples
 
@@ -47,6 +53,7 @@ contains
 
       call turn_map(size(self%y, 1), size(self%y, 3), self%pair, self%y, self%mu, 0.0_wp, x, &
                     after, m)
+      after = after + self%drift
    end subroutine turn
 
    !> Whether the discs that hold the limit x determine it alone, without its start: every direction

@@ -4,15 +4,17 @@
 !>
 !> Members that follow events keep doing so beside members that decide at instants.
 module fw_several_laws
-   use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed
+   use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed, pair_open, &
+      pair_stuck
    use fw_fourier, only: fourier_type, new_fourier
+   use fw_gap_motion, only: gap_motion
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
    use fw_worn_friction, only: worn_friction
    implicit none (type, external)
    private
 
-   public :: several_laws, common_facts
+   public :: several_laws, common_facts, lean_facts
 
    !> A law and the pairs that follow it.
    type :: member_type
@@ -26,9 +28,13 @@ module fw_several_laws
       type(member_type), allocatable, private :: member(:)
       !> Of each pair its member, and its place there (n_elements).
       integer, allocatable, private :: of_member(:), place(:)
+      !> Of pairs on a side that slides steadily, whose member presses alone: friction for each
+      !> normal force, mu v/|v| (n_elements, 2); 0 elsewhere. Not allocated where there are none.
+      real(wp), allocatable, private :: lean(:, :)
    contains
       procedure :: add
       procedure :: join
+      procedure :: leans
       procedure :: take_prediction
       procedure :: reserve
       procedure :: evaluate
@@ -85,10 +91,13 @@ contains
    end subroutine add
 
    !> Once all members are there: what the law of all pairs is.
-   subroutine join(self, present)
+   subroutine join(self, present, mu, speed)
       class(several_laws), intent(inout) :: self
       !> Which components exist (3, n_pairs).
       logical, intent(in) :: present(:, :)
+      !> Of pairs on a side that slides steadily, whose members press alone and see no tangential
+      !> directions: friction coefficients (n_pairs) and velocities (n_pairs, 2), 0 for others.
+      real(wp), intent(in) :: mu(:), speed(:, :)
       integer :: i, m, n
 
       n = size(present, 2)
@@ -105,6 +114,8 @@ contains
             self%prediction%load(at) = law%prediction%load
             call join_growth(law%prediction%gap_growth, at, n, self%prediction%gap_growth)
             call join_growth(law%prediction%load_growth, at, n, self%prediction%load_growth)
+            call join_speeds(law%prediction%speed, at, n, self%prediction%speed)
+            call join_motion(law%prediction%gap_motion, at, n, self%prediction%gap_motion)
             self%prediction%own(at) = input_facts(law%prediction%order, law%prediction%by_time, &
                                                   law%prediction%takes_balance, &
                                                   law%prediction%has_inertia)
@@ -118,8 +129,73 @@ contains
          p%takes_balance = any(p%own%takes_balance)
          p%has_inertia = any(p%own%has_inertia)
       end associate
+      if (any(abs(speed) > 0.0_wp)) call take_lean(self, mu, speed)
       call find_facts(self)
    end subroutine join
+
+   !> Friction of pairs on a side that slides steadily, for each normal force.
+   pure subroutine take_lean(self, mu, speed)
+      class(several_laws), intent(inout) :: self
+      real(wp), intent(in) :: mu(:), speed(:, :)
+      real(wp) :: size_of
+      integer :: i
+
+      allocate (self%lean(self%n_elements, 2), source=0.0_wp)
+      if (.not. allocated(self%prediction%speed)) allocate (self%prediction%speed, source=self%lean)
+      do i = 1, self%n_elements
+         size_of = norm2(speed(i, :))
+         if (.not. size_of > 0.0_wp) cycle
+         self%lean(i, :) = merge(mu(i)*speed(i, :)/size_of, 0.0_wp, self%present(1:2, i))
+         self%prediction%speed(i, :) = speed(i, :)
+      end do
+   end subroutine take_lean
+
+   !> Whether side 2 of a pair slides steadily.
+   elemental logical function leans(self, pair)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: pair
+
+      leans = .false.
+      if (allocated(self%lean)) leans = any(abs(self%lean(pair, :)) > 0.0_wp)
+   end function leans
+
+   !> Friction of the pairs that lean, from their normal forces (n_pairs, 3, :).
+   pure subroutine add_lean(self, at, force)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: at(:)
+      real(wp), intent(inout) :: force(:, :, :)
+      integer :: c, i
+
+      if (.not. allocated(self%lean)) return
+      do i = 1, size(at)
+         if (.not. self%leans(at(i))) cycle
+         do c = 1, 2
+            force(at(i), c, :) = self%lean(at(i), c)*force(at(i), 3, :)
+         end do
+      end do
+   end subroutine add_lean
+
+   !> The block of a pair that leans, from that of its member: of a pair that always bears, too.
+   pure subroutine lean_block(lean, nc, state, block)
+      real(wp), intent(in) :: lean(2)
+      integer, intent(in) :: nc
+      integer, intent(inout) :: state
+      !> Transposed derivative (input, output).
+      real(wp), intent(inout) :: block(:, :)
+      integer :: c, k
+
+      if (state == pair_open) return
+      if (state == pair_stuck) then
+         block = 0.0_wp
+         do k = 2*nc + 1, 3*nc
+            block(k, k) = 1.0_wp
+         end do
+         state = pair_mixed
+      end if
+      do c = 1, 2
+         block(:, (c - 1)*nc + 1:c*nc) = lean(c)*block(:, 2*nc + 1:)
+      end do
+   end subroutine lean_block
 
    !> What grows of some pairs among all.
    pure subroutine join_growth(growth, at, n, joined)
@@ -131,6 +207,32 @@ contains
       if (.not. allocated(joined)) allocate (joined(n), source=0.0_wp)
       joined(at) = growth
    end subroutine join_growth
+
+   !> Velocities of side 2 of some pairs among all.
+   pure subroutine join_speeds(speed, at, n, joined)
+      real(wp), allocatable, intent(in) :: speed(:, :)
+      integer, intent(in) :: at(:), n
+      real(wp), allocatable, intent(inout) :: joined(:, :)
+
+      if (.not. allocated(speed)) return
+      if (.not. allocated(joined)) allocate (joined(n, 2), source=0.0_wp)
+      joined(at, :) = speed
+   end subroutine join_speeds
+
+   !> Gaps that move of some pairs among all: the harmonics are those of the case.
+   pure subroutine join_motion(motion, at, n, joined)
+      type(gap_motion), allocatable, intent(in) :: motion
+      integer, intent(in) :: at(:), n
+      type(gap_motion), allocatable, intent(inout) :: joined
+
+      if (.not. allocated(motion)) return
+      if (.not. allocated(joined)) then
+         allocate (joined)
+         joined%harmonic = motion%harmonic
+         allocate (joined%amplitude(n, size(motion%harmonic)), source=(0.0_wp, 0.0_wp))
+      end if
+      joined%amplitude(at, :) = motion%amplitude
+   end subroutine join_motion
 
    !> How the friction of some pairs changes: that of all has the same form.
    subroutine take_worn(self, at, worn)
@@ -159,7 +261,19 @@ contains
          facts(m) = self%member(m)%law%facts
       end do
       self%facts = common_facts(facts)
+      if (allocated(self%lean)) call lean_facts(self%facts)
    end subroutine find_facts
+
+   !> What steady sliding takes from a law of the pairs.
+   elemental subroutine lean_facts(facts)
+      type(law_facts), intent(inout) :: facts
+
+      facts%is_odd = .false.
+      facts%measures_slip = .false.
+      facts%has_multipliers = .false.
+      facts%is_integrated = .false.
+      facts%acts_at_once = .false.
+   end subroutine lean_facts
 
    !> What holds of pairs of several laws together.
    pure type(law_facts) function common_facts(facts) result(shared)
@@ -198,6 +312,8 @@ contains
       do m = 1, size(self%member)
          associate (law => self%member(m)%law, at => self%member(m)%pair)
             law%present = self%present(:, at)
+            law%present(1:2, :) = law%present(1:2, :) .and. &
+               .not. spread(self%leans(at), 1, 2)
             law%mu = self%mu(at)
             law%prediction%stiffness = self%prediction%stiffness(at, :)
             law%prediction%gap = self%prediction%gap(at)
@@ -205,6 +321,8 @@ contains
             if (allocated(self%prediction%inertia) .and. law%prediction%has_inertia) then
                law%prediction%inertia = self%prediction%inertia(at, :)
                law%prediction%damping = self%prediction%damping(at, :)
+               ! No direction with mass rubs by itself.
+               where (.not. transpose(law%present)) law%prediction%inertia = 0.0_wp
             end if
          end associate
       end do
@@ -294,10 +412,25 @@ contains
                   call law%evaluate(fourier, own)
                end if
                call give_forces(self%member(m)%pair, own, work)
+               call lean_forces(self, self%member(m)%pair, work)
             end associate
          end do
       end select
    end subroutine evaluate_members
+
+   !> Pairs that lean slip wherever they bear, and come to rest nowhere.
+   pure subroutine lean_forces(self, at, work)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: at(:)
+      type(force_workspace), intent(inout) :: work
+
+      if (.not. allocated(self%lean)) return
+      call add_lean(self, at, work%force)
+      where (self%leans(at))
+         work%rests(at) = .false.
+         work%state(at) = merge(pair_mixed, work%state(at), work%state(at) == pair_stuck)
+      end where
+   end subroutine lean_forces
 
    !> From the workspace of all pairs to that of a member.
    pure subroutine take_inputs(at, work, own)
@@ -356,8 +489,12 @@ contains
                work%linear_state(at) = own%linear_state
                work%linear_rests(at) = own%linear_rests
                do i = 1, size(at)
-                  if (own%linear_state(i) /= pair_mixed) cycle
-                  work%jacobian(:, :, at(i)) = own%jacobian(:, :, i)
+                  if (own%linear_state(i) == pair_mixed) &
+                     work%jacobian(:, :, at(i)) = own%jacobian(:, :, i)
+                  if (.not. self%leans(at(i))) cycle
+                  work%linear_rests(at(i)) = .false.
+                  call lean_block(self%lean(at(i), :), fourier%n_coefficients, &
+                                  work%linear_state(at(i)), work%jacobian(:, :, at(i)))
                end do
                if (own%measures_slip) work%slip_derivative(:, at) = own%slip_derivative
             end associate
@@ -382,6 +519,7 @@ contains
                end if
                call self%member(m)%law%sample(own)
                work%force_time(at, :, :) = own%force_time
+               call add_lean(self, at, work%force_time)
             end associate
          end do
       end select
@@ -403,6 +541,7 @@ contains
             of_member = force(self%member(m)%pair, :, :)
             call self%member(m)%law%coefficients(room%work(m), computed, fourier, of_member)
             force(self%member(m)%pair, :, :) = of_member
+            call add_lean(self, self%member(m)%pair, force)
          end do
       end select
    end subroutine coefficients
@@ -422,6 +561,7 @@ contains
             of_member = force(self%member(m)%pair, :, :)
             call self%member(m)%law%tail(room%work(m), highest, of_member)
             force(self%member(m)%pair, :, :) = of_member
+            call add_lean(self, self%member(m)%pair, force)
          end do
       end select
    end subroutine tail
@@ -440,6 +580,11 @@ contains
          do m = 1, size(self%member)
             of_member = share(:, self%member(m)%pair)
             call self%member(m)%law%fractions(room%work(m), of_member)
+            where (self%leans(self%member(m)%pair))
+               ! Where it bears it slips.
+               of_member(2, :) = of_member(1, :) + of_member(2, :)
+               of_member(1, :) = 0.0_wp
+            end where
             share(:, self%member(m)%pair) = of_member
          end do
       end select

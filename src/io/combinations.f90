@@ -55,6 +55,15 @@ contains
       if (allocated(error)) return
       associate (highest => case%model%waves%highest())
          if (.not. analyses(case%analysis)%has_points) return
+         if (case%contact%highest_gap() > case%harmonics%n_harmonics) then
+            call fatal_error(error, 'harmonics%n_harmonics = '// &
+                             to_text(case%harmonics%n_harmonics)//', but a gap (contact%'// &
+                             'gap_harmonic, gap_order or /contact/gap_harmonic of the model '// &
+                             'file) moves in harmonic '//to_text(case%contact%highest_gap())// &
+                             ': must be at least '//to_text(case%contact%highest_gap()), &
+                             status_input)
+            return
+         end if
          if (highest <= case%harmonics%n_harmonics) return
          call fatal_error(error, 'harmonics%n_harmonics = '// &
                           to_text(case%harmonics%n_harmonics)//', but &load (or /load/harmonic '// &

@@ -4,7 +4,7 @@
 !> HDF5 counts the slowest dimension first, and matrices are transposed back, so that element
 !> (i, j) is the one h5py calls [i-1, j-1].
 module fw_model_file
-   use fw_contact_data, only: contact_type
+   use fw_contact_data, only: contact_type, sliding_words
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hdf5, only: hdf5_file, has_attribute, read_attribute
    use fw_laws, only: law_words
@@ -52,6 +52,7 @@ contains
       end if
       if (.not. allocated(error)) call read_law(source%file, model%contact, error)
       if (.not. allocated(error)) call read_normal_law(source%file, model%contact, error)
+      if (.not. allocated(error)) call read_sliding(source%file, model%contact, error)
       if (.not. allocated(error)) call check_after(source%file, model, error)
       call source%file%close(ignored)
    end subroutine read_model_hdf5
@@ -159,6 +160,27 @@ contains
          contact%normal_law = spread(number, 1, size(contact%side_1, 2))
       end if
    end subroutine read_normal_law
+
+   !> How friction follows a side that slides.
+   subroutine read_sliding(file, contact, error)
+      type(hdf5_file), intent(in) :: file
+      type(contact_type), intent(inout) :: contact
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: word
+      integer :: number
+
+      if (.not. allocated(contact%side_1)) return
+      if (.not. has_attribute(file, '/contact', 'sliding')) return
+      call read_attribute(file, '/contact', 'sliding', word, error)
+      if (allocated(error)) return
+      number = findloc(sliding_words == word, .true., dim=1)
+      if (number == 0) then
+         call fatal_error(error, file%path//': attribute sliding of /contact is "'//word// &
+                          '", expected '//words_text(sliding_words), status_input)
+      else
+         contact%sliding = number
+      end if
+   end subroutine read_sliding
 
    !> Number of sectors; 0 where the file has no group /cyclic.
    subroutine count_sectors(file, n_sectors, error)

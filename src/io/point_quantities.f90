@@ -17,7 +17,8 @@ module fw_point_quantities
    use fw_quantity_conditions, only: always, asks_stability, changes_friction, follows_branch, &
       follows_frequency, follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, &
       has_levels, has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, &
-      is_mistuned, is_mode, is_response, moves_base, scales_load, shows_contact, shows_user, wears
+      is_mistuned, is_mode, is_response, moves_base, moves_obstacle, scales_load, shows_contact, &
+      shows_user, wears
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -131,6 +132,8 @@ contains
                'share of the period in stick, slip, open', shows_contact)
       call add('contact/dissipation', r, '<energy>', 'point pair', 'friction energy per cycle', &
                shows_contact)
+      call add('contact/obstacle_work', r, '<energy>', 'point pair', &
+               'work per cycle of obstacles that move', moves_obstacle)
       call add('damper/dissipation', r, '<energy>', 'point dampers', 'energy that each damper '// &
                'takes per cycle', has_dampers)
       call add('structural/dissipation', r, '<energy>', 'point', &
@@ -457,6 +460,8 @@ contains
          if (allocated(point%fraction)) values = reshape(point%fraction, [size(point%fraction)])
       case ('contact/dissipation')
          if (allocated(point%dissipation)) values = point%dissipation
+      case ('contact/obstacle_work')
+         if (allocated(point%obstacle_work)) values = point%obstacle_work
       case ('damper/dissipation')
          if (.not. allocated(point%work_of)) return
          k = element_kind('damper')

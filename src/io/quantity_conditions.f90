@@ -11,7 +11,8 @@ module fw_quantity_conditions
    public :: always, asks_stability, changes_friction, follows_branch, follows_frequency, &
              follows_parameter, follows_speed, goes_over, has_dampers, has_endurance, has_levels, &
              has_stress, has_structural, has_tensor, is_accurate, is_controlled, is_mission, &
-             is_mistuned, is_mode, is_response, moves_base, scales_load, shows_contact, &
+             is_mistuned, is_mode, is_response, moves_base, moves_obstacle, scales_load, &
+             shows_contact, &
              shows_user, wears
 
 contains
@@ -66,6 +67,14 @@ contains
 
       moves_base = allocated(case%model%base_parts)
    end function moves_base
+
+   !> Gaps that have harmonics, or a side 2 that slides.
+   pure logical function moves_obstacle(case)
+      type(case_type), intent(in) :: case
+
+      moves_obstacle = case%output%contact .and. case%contact%n_pairs > 0 .and. &
+                       case%contact%moves_obstacle()
+   end function moves_obstacle
 
    !> Elements with laws of a user, which are shown as contact is.
    pure logical function shows_user(case)

@@ -2,7 +2,7 @@
 module fw_read_case
    use fw_combinations, only: check_combinations
    use fw_case, only: analyses, case_type
-   use fw_contact_data, only: memory_carried
+   use fw_contact_data, only: memory_carried, sliding_path
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, sampling_uniform, usual_accuracy
    use fw_kinds, only: wp
@@ -19,6 +19,7 @@ module fw_read_case
    use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
+   use fw_read_obstacle, only: check_gap_orders, read_obstacle
    use fw_read_options, only: read_campbell, read_harmonics, read_mission, read_mode, &
       read_population, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
@@ -210,7 +211,8 @@ contains
                 h%method == method_hbm .and. h%sampling /= sampling_uniform .and. &
                 h%n_time == 0 .and. .not. case%output%histories .and. &
                 .not. any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)) .and. &
-                .not. feeds_energy(case)
+                .not. feeds_energy(case) .and. &
+                .not. (c%slides() .and. c%sliding == sliding_path)
       end associate
    end function goes_with_events
 
@@ -450,7 +452,7 @@ contains
       type(load_terms) :: terms
       character(:), allocatable :: worn
       integer, allocatable :: wanted(:)
-      integer :: n_dof
+      integer :: gap_order, n_dof
 
       call read_model(reader, directory_of(path), options, raw, n_dof, error, memory_model)
       if (allocated(error)) return
@@ -464,6 +466,7 @@ contains
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
+      call read_obstacle(reader, case%model%cyclic, case%contact, gap_order)
       call case%contact%turn(options%rotation_speed, options%speed_order)
       ! What finds whether anything depends on the speed looks there.
       call take(case%contact%gap_rotation, raw%contact%gap_rotation)
@@ -487,6 +490,8 @@ contains
       case%damps_modes = options%modal_damping > 0.0_wp
       case%damps_modes_up_to = options%modal_damping_up_to
       call read_loads(reader, options, raw, terms)
+      if (.not. reader%failed()) call check_gap_orders(reader, gap_order, terms%fundamental, raw, &
+                                                       case%model%cyclic)
       call case%stress%take(raw%stress, options%rotation_speed)
       call read_motion(reader, case%model%cyclic%has_sectors(), raw, case%contact, case%springs, &
                        case%elements)

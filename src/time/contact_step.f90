@@ -47,6 +47,8 @@ module fw_contact_step
       real(wp), allocatable :: start(:), speed(:)
       !> Whether the gap of the pair is closed, so that it may bear (n_pairs).
       logical, allocatable :: closed(:)
+      !> What an obstacle adds to gaps in this step (n_pairs).
+      real(wp), allocatable :: moved(:)
       !> state_open, state_stick or state_slip (n_pairs).
       integer, allocatable :: state(:)
       !> Largest force seen, the scale of the tolerance.
@@ -77,6 +79,7 @@ contains
       allocate (self%force(n), self%free(n), self%rate(n), self%mismatch(n), self%relative(n), &
                 self%start(n), self%speed(n), source=0.0_wp)
       allocate (self%closed(structure%n_pairs), source=.true.)
+      allocate (self%moved(structure%n_pairs), source=0.0_wp)
       allocate (self%state(structure%n_pairs), source=state_stick)
       allocate (self%slope(3, 3, structure%n_pairs), source=0.0_wp)
       call self%lu%reserve(n)
@@ -250,7 +253,8 @@ contains
             by_s(c) = law%prediction%stiffness(i, c)
             if (law%prediction%order_of(i, c) > 0) by_s(c) = by_s(c)*self%speed(r)
          end do
-         call law%at_instant(i, law%input_at(i, u, v, structure%depth(i)), force, slope)
+         call law%at_instant(i, law%input_at(i, u, v, structure%depth(i) + self%moved(i)), &
+                             force, slope)
          self%state(i) = state_open
          ! Smooth friction never sticks; without friction there is nothing to slip.
          if (force(3) < 0.0_wp) self%state(i) = merge(state_slip, state_stick, &

@@ -22,6 +22,8 @@ module fw_period_record
       real(wp), allocatable :: share(:, :)
       !> Work of the contact forces (n_pairs) [force * length].
       real(wp), allocatable :: work(:)
+      !> Work of obstacles that move (n_pairs).
+      real(wp), allocatable :: obstacle_work(:)
       !> Steps taken, all refinements included, and contact problems that were not solved.
       integer :: n_taken = 0
       integer :: n_failed = 0
@@ -39,7 +41,7 @@ contains
       self%n_steps = n_steps
       allocate (self%observed(n_observed, n_steps), self%observed_mean(n_observed, n_steps))
       allocate (self%force(3, n_pairs, n_steps), self%slip(3, n_pairs, n_steps))
-      allocate (self%share(3, n_pairs), self%work(n_pairs))
+      allocate (self%share(3, n_pairs), self%work(n_pairs), self%obstacle_work(n_pairs))
       call self%clear()
    end function new_period_record
 
@@ -53,6 +55,7 @@ contains
       self%slip = 0.0_wp
       self%share = 0.0_wp
       self%work = 0.0_wp
+      self%obstacle_work = 0.0_wp
       self%n_taken = 0
       self%n_failed = 0
    end subroutine clear

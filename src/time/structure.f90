@@ -13,6 +13,7 @@ module fw_time_structure
    use fw_elements, only: element_list
    use fw_error, only: error_type, fatal_error, status_failure, status_input
    use fw_force_law, only: force_law
+   use fw_gap_motion, only: gap_motion, take_gap_motion
    use fw_instant_law, only: as_instant_law, instant_law
    use fw_lapack, only: dgemm, dsyevd
    use fw_laws, only: build_law
@@ -61,6 +62,10 @@ module fw_time_structure
       real(wp), allocatable :: compliance(:)
       !> Friction coefficient, gap with wear [length], constant normal force [force] (n_pairs).
       real(wp), allocatable :: mu(:), gap(:), normal_load(:)
+      !> What gaps have in harmonics, where they move, and velocities of side 2 along t1 and t2
+      !> (n_pairs, 2) [length/time].
+      type(gap_motion), allocatable :: motion
+      real(wp), allocatable :: speed(:, :)
       !> The law of the pairs, those that act at once, by its `at_instant` (n_pairs), and the depth
       !> that they are worn by [length].
       class(pair_law), allocatable :: law
@@ -136,6 +141,7 @@ contains
       allocate (self%compliance(3*contact%n_pairs), source=0.0_wp)
       allocate (self%rows(self%n_dof, 3*contact%n_pairs + self%n_springs), source=0.0_wp)
       allocate (self%mu(0), self%gap(0), self%normal_load(0), self%at_once(0), self%depth(0))
+      self%speed = contact%speeds()
       if (contact%n_pairs == 0) return
       call build_law(contact, present, self%law)
       self%mu = self%law%mu
@@ -144,6 +150,7 @@ contains
       if (allocated(contact%depth)) self%depth = contact%depth
       ! Worn depth opens the contact further (docs/theory.md, Motion).
       self%gap = self%law%prediction%gap
+      call take_gap_motion(contact, self%motion)
       if (allocated(contact%depth)) self%gap = self%gap + contact%depth
       self%normal_load = self%law%prediction%load
       do i = 1, contact%n_pairs

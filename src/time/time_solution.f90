@@ -152,6 +152,7 @@ contains
       end do
       point%fraction = record%share
       point%dissipation = record%work
+      point%obstacle_work = record%obstacle_work
       point%force_history = record%force
       point%slip_history = record%slip
    end subroutine fill_point

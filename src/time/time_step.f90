@@ -25,6 +25,7 @@ contains
          call take_rows(s, self%displacement, self%row_position)
          call take_rows(s, self%velocity, self%row_velocity)
          call take_rows(s, self%increment, self%row_increment)
+         call move_obstacles(self, instant, step%duration)
          call set_references(self, step%h)
          self%contact%omega = self%omega
          self%contact%tau = 2.0_wp*pi*instant + 0.5_wp*self%omega*step%duration
@@ -68,6 +69,29 @@ contains
       end do
    end subroutine mean_load
 
+   !> Gaps at both ends of a step, and the time of its middle.
+   pure subroutine move_obstacles(self, instant, duration)
+      class(time_stepper), intent(inout) :: self
+      real(wp), intent(in) :: instant, duration
+      real(wp) :: tau(2)
+      integer :: i
+
+      self%middle = 2.0_wp*pi/self%omega*instant + 0.5_wp*duration
+      self%gap(:, :3) = spread(self%structure%gap, 2, 3)
+      if (.not. allocated(self%structure%motion)) return
+      tau = 2.0_wp*pi*instant + [0.0_wp, self%omega*duration]
+      associate (motion => self%structure%motion)
+         do i = 1, self%structure%n_pairs
+            self%gap(i, 1) = self%gap(i, 1) + motion%at_angle(i, tau(1))
+            self%gap(i, 3) = self%gap(i, 3) + motion%at_angle(i, tau(2))
+            self%gap(i, 2) = 0.5_wp*(self%gap(i, 1) + self%gap(i, 3))
+            self%gap(i, 4) = self%omega*motion%slope_at(i, tau(2))
+         end do
+      end associate
+      ! Pairs that act at once take it with their depth.
+      self%contact%moved = self%gap(:, 2) - self%structure%gap
+   end subroutine move_obstacles
+
    !> B x of a vector of dofs.
    subroutine take_rows(structure, vector, rows)
       type(time_structure), intent(in) :: structure
@@ -100,15 +124,19 @@ contains
                   ! Massless directions go from value to value, the others from end to end.
                   self%contact%speed(r) = merge(1.0_wp, 2.0_wp, s%massless(r))/h
                else if (.not. in_positions(s, r)) then
-                  ! v+ = 4 d/h - v: v+ = 0 at d = h v/4.
-                  free(r) = self%row_increment(r) - 0.25_wp*h*self%row_velocity(r)
-                  if (c == 3) self%contact%closed(i) = self%row_position(r) + s%gap(i) <= 0.0_wp
+                  ! v+ = 4 d/h - v: v+ = 0 at d = h v/4, and as much as side 2 moves at d as much
+                  ! further.
+                  free(r) = self%row_increment(r) - 0.25_wp*h*(self%row_velocity(r) + &
+                                                               speed_of(self, i, c))
+                  if (c == 3) self%contact%closed(i) = self%row_position(r) + &
+                                                       self%gap(i, 1) <= 0.0_wp
                else if (c == 3) then
                   ! Half-way position with its gap: zero where it just closes.
-                  free(r) = self%row_increment(r) + (self%row_position(r) + s%gap(i))
+                  free(r) = self%row_increment(r) + (self%row_position(r) + self%gap(i, 2))
                else
-                  ! Half-way position from where it sticks.
-                  free(r) = self%row_increment(r) + (self%row_position(r) - self%memory(r))
+                  ! Half-way position from where it sticks, in the frame of side 2.
+                  free(r) = self%row_increment(r) + (self%row_position(r) - self%memory(r)) - &
+                            s%speed(i, c)*self%middle
                end if
             end do
          end do
@@ -119,6 +147,18 @@ contains
          end do
       end associate
    end subroutine set_references
+
+   !> How fast side 2 of a pair moves away at the end of the step.
+   pure real(wp) function speed_of(self, pair, component) result(speed)
+      class(time_stepper), intent(in) :: self
+      integer, intent(in) :: pair, component
+
+      if (component == 3) then
+         speed = -self%gap(pair, 4)
+      else
+         speed = self%structure%speed(pair, component)
+      end if
+   end function speed_of
 
    !> Whether the contact of a row is written in positions: massless or elastic.
    elemental logical function in_positions(structure, row)
@@ -151,7 +191,8 @@ contains
             else if (.not. self%contact%closed(i)) then
                r = s%row(3, i)
                ! Twice the increment is the whole step: the gap would be closed at its end.
-               any_change = self%row_position(r) + 2.0_wp*self%row_increment(r) + s%gap(i) < 0.0_wp
+               any_change = self%row_position(r) + 2.0_wp*self%row_increment(r) + &
+                            self%gap(i, 3) < 0.0_wp
             end if
             if (any_change) return
          end do
@@ -168,7 +209,7 @@ contains
       associate (s => self%structure)
          ! Displacements in the middle of the step, which massless directions alone have.
          self%mean = self%displacement + self%increment
-         if (s%n_pairs > 0) call record_contact(self, share, sample)
+         if (s%n_pairs > 0) call record_contact(self, share, self%step(level)%duration, sample)
          call s%project(self%increment, self%part)
          if (allocated(s%massive)) then
             ! What the projection leaves of the mean is the massless part; the load of the step is
@@ -188,11 +229,11 @@ contains
    end subroutine accept_step
 
    !> Means of forces and displacements, shares of the states, work; corrected positions move.
-   subroutine record_contact(self, share, sample)
+   subroutine record_contact(self, share, duration, sample)
       class(time_stepper), intent(inout) :: self
-      real(wp), intent(in) :: share
+      real(wp), intent(in) :: share, duration
       integer, intent(in) :: sample
-      real(wp) :: period_share, step_length, force
+      real(wp) :: period_share, step_length, force, carried
       integer :: i, c, r, place
 
       period_share = share/real(self%record%n_steps, wp)
@@ -207,8 +248,13 @@ contains
                ! Of a row with mass: its whole motion works against the mean force.
                step_length = 2.0_wp*self%row_increment(r)
                force = contact%force(r)
+               ! What side 2 adds to the relative motion.
+               carried = self%gap(i, 3) - self%gap(i, 1)
+               if (c < 3) carried = -s%speed(i, c)*duration
+               record%obstacle_work(i) = record%obstacle_work(i) + force*carried
                if (s%at_once(i)) then
                   if (s%massless(r)) step_length = self%row_increment(r)
+                  step_length = step_length + carried
                else if (in_positions(s, r)) then
                   step_length = 0.0_wp
                   if (c < 3 .and. contact%state(i) /= state_stick) then
@@ -219,6 +265,8 @@ contains
                      ! From the middle of the last step to that of this one.
                      force = 0.5_wp*(force + self%last_force(r))
                   end if
+               else
+                  step_length = step_length + carried
                end if
                record%work(i) = record%work(i) + force*step_length
             end do

@@ -50,6 +50,10 @@ module fw_time_stepper
       ! Workspace: increment and parts (n_dof); displacement, velocity, increment of rows (n_rows).
       real(wp), allocatable :: increment(:), load(:), part(:), mean(:)
       real(wp), allocatable :: row_position(:), row_velocity(:), row_increment(:), last_force(:)
+      !> Gaps at the start of a step, their mean over both ends and at its end, and how fast they
+      !> open there (n_pairs, 4) [length], [length/time]; the middle of the step [time].
+      real(wp), allocatable :: gap(:, :)
+      real(wp) :: middle = 0.0_wp
       !> Forces (n_rows) and states (n_pairs, -1: none yet) of the last step that was taken.
       integer, allocatable :: last_state(:)
    contains
@@ -114,6 +118,7 @@ contains
       allocate (self%memory(n), self%row_position(n), self%row_velocity(n), &
                 self%row_increment(n), self%last_force(n), source=0.0_wp)
       allocate (self%last_state(structure%n_pairs), source=-1)
+      allocate (self%gap(structure%n_pairs, 4), source=0.0_wp)
       call set_weights(self)
    end subroutine new_time_stepper
 
@@ -173,6 +178,7 @@ contains
          done = .not. must_end(self%interrupt)
          if (.not. done) return
          call advance(self, k)
+         if (k == self%record%n_steps) call leave_frame(self)
          finish(:n) = self%displacement
          finish(n + 1:2*n) = self%velocity
          finish(2*n + 1:) = self%memory
@@ -181,6 +187,22 @@ contains
       ! False for NaN too.
       done = norm2(finish) <= huge(1.0_wp)
    end subroutine integrate
+
+   !> Corrected positions of rows whose side 2 slides stand in a frame that goes with it, and that
+   !> starts anew with each period.
+   pure subroutine leave_frame(self)
+      type(time_stepper), intent(inout) :: self
+      integer :: c, i
+
+      associate (s => self%structure)
+         do i = 1, s%n_pairs
+            do c = 1, 2
+               if (s%row(c, i) > 0) self%memory(s%row(c, i)) = self%memory(s%row(c, i)) + &
+                  2.0_wp*pi/self%omega*s%speed(i, c)
+            end do
+         end do
+      end associate
+   end subroutine leave_frame
 
    !> One full step, halved where states change. Positions are counted in smallest steps.
    subroutine advance(self, sample)

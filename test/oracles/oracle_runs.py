@@ -24,6 +24,7 @@ class Result:
     force: np.ndarray | None
     fraction: np.ndarray | None
     dissipation: np.ndarray | None
+    obstacle_work: np.ndarray | None
     history_force: np.ndarray | None
     history_relative: np.ndarray | None
 
@@ -43,7 +44,7 @@ def read_result(path):
         return Result(
             file["omega"][()], file["coefficients"][()], file["amplitude"][()],
             file["converged"][()].astype(bool), optional("contact/force"),
-            optional("contact/fraction"), optional("contact/dissipation"),
+            optional("contact/fraction"), optional("contact/dissipation"), optional("contact/obstacle_work"),
             optional("history/force"), optional("history/relative_displacement"))
 
 

@@ -47,7 +47,11 @@ def test_motion_and_force_are_as_integrated(tmp_path, name, bounds):
         f = coefficients_of(case["force_1"], n_harmonics)[:kept]
         assert difference(found.coefficients[0][:kept, 0], u) < bound
         assert difference(found.force[0][:kept, 0, 0], f) < 5.0 * bound
-        assert abs(found.dissipation[0, 0] / case["work_per_cycle"][0] - 1.0) < 2.0 * bound
+        # The reference has what friction takes from the structure.
+        taken = found.dissipation[0, 0]
+        if found.obstacle_work is not None:
+            taken -= found.obstacle_work[0, 0]
+        assert abs(taken / case["work_per_cycle"][0] - 1.0) < 2.0 * bound
 
 
 def test_a_moving_side_has_even_harmonics(tmp_path):
@@ -145,11 +149,13 @@ def test_constants_that_are_not_there_have_no_derivative(tmp_path, parameter, co
     ({"mu_dynamic": 0.2}, "weakening_speed is missing"),
     ({"mu_dynamic": 0.2, "weakening_speed": 0.3, "weakening_exponent": 3.0},
      "weakening_exponent(1) = 3.0: must be a finite real from 1 to 2"),
-    ({"law": "penalty", "tangential_stiffness": 1.0, "speed_1": 0.1},
-     "speed_1 belongs to law = 'regularised'")])
+    ({"law": "penalty", "tangential_stiffness": 1.0, "mu_viscous": 0.1},
+     "mu_viscous belongs to law = 'regularised'"),
+    ({"law": "iwan", "tangential_stiffness": 1.0, "iwan_chi": 0.0, "speed_1": 0.1},
+     "speed_1 belongs to law = 'dlft'")])
 def test_what_does_not_go_together_is_told(tmp_path, contact, words):
     case = groups(REFERENCE["cases"]["tanh_0.9"]["params"], 3)
-    if contact.get("law") == "penalty":
+    if contact.get("law") in ("penalty", "iwan"):
         del case["contact"]["slip_speed"]
     case["contact"] |= contact
     assert words in run(tmp_path, case, status=3).stderr

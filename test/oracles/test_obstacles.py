@@ -1,0 +1,240 @@
+"""Obstacles that move: gaps in harmonics and a side that slides.
+
+test/reference/bodies/v4 .. v7: harmonic balances of a march at stated instants, of other origin:
+elastic friction on the path, steady sliding in two directions, smooth and rigid friction.
+"""
+import copy
+import json
+
+import numpy as np
+import pytest
+from cases import merged, run
+from oracle_runs import run_case
+from project import ROOT
+
+NAMES = ("v4_rub_path", "v5_rub_steady", "v6_rub_regularised", "v7_rub_rigid")
+
+
+def oracle(name):
+    return json.loads((ROOT / f"test/reference/bodies/{name}.json").read_text())
+
+
+def at(groups, omega, **others):
+    """The case at a frequency, with contact keys replaced."""
+    case = merged(copy.deepcopy(groups), {"sweep": {"start": omega}})
+    for key, value in others.items():
+        case["contact"][key] = value
+    return case
+
+
+def distance(found, wanted):
+    return np.abs(np.asarray(found) - np.asarray(wanted)).max() / np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reference_is_met(tmp_path, name):
+    reference = oracle(name)
+    for point in reference["points"]:
+        found = run_case(tmp_path, at(reference["groups"], point["omega"]))
+        assert found.converged.all()
+        assert distance(found.coefficients[0], point["u"]) < reference["tolerance"]
+        assert distance(found.force[0], point["force"]) < reference["tolerance"]
+
+
+# Wrong variants differ by far more than the tolerance: phases turned, the speed turned or left out.
+@pytest.mark.parametrize("name", NAMES)
+def test_reference_tells_wrong_variants(tmp_path, name):
+    reference = oracle(name)
+    contact, point = reference["groups"]["contact"], reference["points"][0]
+    for change in ({"gap_phase": [-p for p in contact["gap_phase"]]},
+                   {"speed_1": [-v for v in contact["speed_1"]]}):
+        found = run_case(tmp_path, at(reference["groups"], point["omega"], **change))
+        assert distance(found.coefficients[0], point["u"]) > 1e-3
+
+
+def test_harmonic_0_is_the_gap(tmp_path):
+    groups = oracle("v4_rub_path")["groups"]
+    contact = groups["contact"]
+    wanted = run_case(tmp_path, at(groups, 100.0, gap=[g + 1e-4 for g in contact["gap"]]))
+    found = run_case(tmp_path, at(
+        groups, 100.0, n_gap_terms=3, gap_pair=[0, 2, 0], gap_harmonic=[1, 2, 0],
+        gap_amplitude=[*contact["gap_amplitude"], 2e-4], gap_phase=[*contact["gap_phase"], 60.0]))
+    assert distance(found.coefficients, wanted.coefficients) < 1e-10
+
+
+def shifted(coefficients, angle):
+    """The motion of tau - angle."""
+    moved = np.array(coefficients)
+    for n in range(1, (len(moved) + 1) // 2):
+        c, s = np.cos(n * angle), np.sin(n * angle)
+        a, b = coefficients[2 * n - 1], coefficients[2 * n]
+        moved[2 * n - 1], moved[2 * n] = c * a - s * b, s * a + c * b
+    return moved
+
+
+# By whole instants, so that the march meets the same values: 32 of 256.
+@pytest.mark.parametrize("name", ("v4_rub_path", "v5_rub_steady", "v7_rub_rigid"))
+def test_a_shift_of_all_phases_shifts_the_motion(tmp_path, name):
+    groups = oracle(name)["groups"]
+    angle = 2.0 * np.pi * 32 / 256
+    plain = run_case(tmp_path, at(groups, 100.0))
+    load = {"cosine": np.zeros(9), "sine": np.zeros(9)}
+    for i in range(9):
+        load["cosine"][i], load["sine"][i] = shifted(
+            np.array([0.0, groups["load"]["cosine"][i], groups["load"]["sine"][i]]), angle)[1:]
+    contact = groups["contact"]
+    phase = [p - n * np.degrees(angle)
+             for p, n in zip(contact["gap_phase"], contact["gap_harmonic"], strict=True)]
+    moved = at(groups, 100.0, gap_phase=phase)
+    moved["load"] |= {key: list(value) for key, value in load.items()}
+    found = run_case(tmp_path, moved)
+    assert distance(found.coefficients[0], shifted(plain.coefficients[0], angle)) < 1e-9
+
+
+def test_the_speed_turns_with_its_direction(tmp_path):
+    groups = oracle("v4_rub_path")["groups"]
+    wanted = run_case(tmp_path, at(groups, 100.0))
+    found = run_case(tmp_path, at(groups, 100.0, side_1=[-4, 0, 6, -7, 0, 9],
+                                  speed_1=[-0.05, -0.05]))
+    assert distance(found.coefficients, wanted.coefficients) < 1e-10
+
+
+def work(force, motion):
+    """Of coefficients of a force and of a displacement, over a period."""
+    return sum(np.pi * n * np.sum(force[2 * n - 1] * motion[2 * n] -
+                                  force[2 * n] * motion[2 * n - 1])
+               for n in range(1, (len(force) + 1) // 2))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_loads_and_obstacle_feed_friction_and_damping(tmp_path, name):
+    groups = oracle(name)["groups"]
+    n_dof = groups["model"]["n_dof"]
+    for omega in (60.0, 140.0):
+        found = run_case(tmp_path, at(groups, omega))
+        u = found.coefficients[0]
+        load = np.zeros_like(u)
+        load[1], load[2] = groups["load"]["cosine"], groups["load"]["sine"]
+        damping = np.reshape(groups["model"]["damping"], (n_dof, n_dof))
+        lost = sum(np.pi * n**2 * omega * a @ damping @ a
+                   for n in range(1, (len(u) + 1) // 2) for a in (u[2 * n - 1], u[2 * n]))
+        brought = work(load, u) + found.obstacle_work.sum()
+        assert abs(found.obstacle_work).max() > 1e-3 * abs(found.dissipation).max()
+        assert abs(brought - lost - found.dissipation.sum()) < 1e-9 * (abs(lost) + abs(
+            found.dissipation).sum())
+
+
+# Heat of steady sliding: mu p times the sliding velocity |v| - du/dt . v/|v|.
+def test_heat_of_steady_sliding(tmp_path):
+    groups = oracle("v5_rub_steady")["groups"]
+    omega = 100.0
+    found = run_case(tmp_path, at(groups, omega))
+    direction = np.array([30.0, -8.0]) / np.hypot(30.0, 8.0)
+    for pair in range(2):
+        pressure = -found.force[0][:, pair, 2]
+        along = found.coefficients[0][:, 3 + 3 * pair:5 + 3 * pair] @ direction
+        mu = groups["contact"]["mu"][pair]
+        heat = mu * (2.0 * np.pi / omega * np.hypot(30.0, 8.0) * pressure[0] -
+                     work(pressure, along))
+        # What 256 instants leave of the work of normal forces, which is none: 4e-6 here.
+        assert abs(found.dissipation[0, pair] / heat - 1.0) < 5e-5
+        assert np.allclose(found.fraction[0, pair, 0], 0.0)
+
+
+# Friction in two directions turns with the vibration: the difference falls with 1/v.
+def test_steady_sliding_is_the_limit_of_the_path(tmp_path):
+    groups = oracle("v5_rub_steady")["groups"]
+    errors = []
+    for speed in (1.0, 10.0, 100.0):
+        path, steady = (run_case(tmp_path, at(groups, 100.0, speed_1=[speed, speed],
+                                              speed_2=[-0.3 * speed, -0.3 * speed],
+                                              sliding=word)).coefficients
+                        for word in ("path", "steady"))
+        errors.append(distance(path, steady))
+    assert errors[0] < 0.05
+    assert errors[1] < 0.3 * errors[0] and errors[2] < 0.3 * errors[1]
+
+
+def test_a_speed_of_nothing_changes_nothing(tmp_path):
+    groups = oracle("v4_rub_path")["groups"]
+    without = at(groups, 100.0)
+    del without["contact"]["speed_1"]
+    found = run_case(tmp_path, at(groups, 100.0, speed_1=[0.0, 0.0])).coefficients
+    assert np.array_equal(found, run_case(tmp_path, without).coefficients)
+
+
+# A branch needs dR/d omega: on the way a wrong one would cost steps or fail.
+@pytest.mark.parametrize("name", NAMES)
+def test_a_branch_goes_through_the_points(tmp_path, name):
+    reference = oracle(name)
+    point = reference["points"][1]
+    groups = merged(copy.deepcopy(reference["groups"]), {
+        "case": {"analysis": "frf"},
+        "sweep": {"start": point["omega"], "end": point["omega"] + 10.0,
+                  "continuation": "arclength"}})
+    found = run_case(tmp_path, groups)
+    assert found.converged.all() and len(found.omega) > 3
+    assert distance(found.coefficients[0], point["u"]) < reference["tolerance"]
+
+
+@pytest.mark.parametrize("law", ("penalty", "dlft", "rigid"))
+def test_orders_and_harmonics_agree(tmp_path, law):
+    groups = oracle("v4_rub_path")["groups"]
+    contact = groups["contact"]
+    del contact["speed_1"]
+    if law != "penalty":
+        del contact["tangential_stiffness"], contact["normal_stiffness"]
+        groups["harmonics"]["sampling"] = "auto"
+        del groups["harmonics"]["n_time"]
+    contact["law"] = law
+    wanted = run_case(tmp_path, at(groups, 100.0))
+    del contact["gap_harmonic"]
+    contact["gap_order"] = [1, 2]
+    found = run_case(tmp_path, at(groups, 100.0))
+    assert np.array_equal(found.coefficients, wanted.coefficients)
+
+
+# Events decide between the instants: 4096 of them come near.
+def test_events_agree_with_many_instants(tmp_path):
+    groups = oracle("v4_rub_path")["groups"]
+    del groups["contact"]["speed_1"]
+    fine = at(groups, 100.0)
+    fine["harmonics"]["n_time"] = 4096
+    events = at(groups, 100.0)
+    events["harmonics"] |= {"sampling": "events"}
+    del events["harmonics"]["n_time"]
+    assert distance(run_case(tmp_path, events).coefficients,
+                    run_case(tmp_path, fine).coefficients) < 1e-5
+
+
+def bad(**contact):
+    return {"contact": contact}
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (bad(n_gap_terms=0), "n_gap_terms"),
+    (bad(gap_pair=[3, 1]), "gap_pair of term 1 is 3: must be 0, for all, to 2"),
+    (bad(gap_harmonic=[1, 12]), "harmonics%n_harmonics = 9, but a gap"),
+    (bad(gap_order=[2, 4], gap_harmonic=None), "multiples of 2, beside loads of order 1"),
+    (bad(gap_order=[1, 2]), "given beside gap_harmonic"),
+    (bad(sliding="steady", speed_1=None), "give speed_1 or speed_2"),
+    (bad(law="rigid", tangential_stiffness=None, normal_stiffness=None), "'steady'"),
+    (bad(sliding="along"), "sliding"),
+    ({"case": {"analysis": "mode"}, "mode": {"start": 1e-4, "end": 1e-3},
+      "sweep": {"start": None}}, "a mode is a motion without excitation"),
+    ({"sweep": {"stability": True}}, "sweep%stability = .true. does not go with"),
+    ({"harmonics": {"parity": "odd"}}, "a moving side")])
+def test_refusals(tmp_path, change, message):
+    groups = at(oracle("v4_rub_path")["groups"], 100.0)
+    for group, keys in change.items():
+        for key, value in keys.items():
+            if value is None:
+                groups[group].pop(key, None)
+            else:
+                groups.setdefault(group, {})[key] = value
+    if change.get("contact", {}).get("n_gap_terms") == 0:
+        del groups["contact"]["n_gap_terms"]
+    done = run(tmp_path, groups, status=3)
+    assert message in done.stderr, done.stderr
+
+
