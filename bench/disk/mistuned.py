@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 import time
 from pathlib import Path
 
@@ -88,7 +89,9 @@ def main() -> int:
         for name in PICTURES:
             shutil.copy(Path(folder) / f"{name}.png",
                         options.output.parent / "images" / f"mistuned_{name}.png")
-    write_section("report", ["", *(f"* {line}" for line in lines), "",
+    report = [textwrap.fill(f"* {line}", 120, subsequent_indent="  ", break_on_hyphens=False)
+              for line in lines]
+    write_section("report", ["", *report, "",
                              f"The job took {seconds:.0f} s with {len(os.sched_getaffinity(0))} "
                              "processors in use by others too.", ""], options.output)
     return 0

@@ -37,7 +37,7 @@ Told = Callable[[int, float], object]
 
 @dataclass(frozen=True)
 class WorstPattern:
-    """The largest of the local maxima that an ascent from several starts has reached.
+    """The largest of what ascents from several starts have reached: local maxima where they ended.
 
     Nothing says that there is no larger one: `agree` tells how many starts came to it.
 
@@ -73,10 +73,12 @@ class WorstPattern:
         return int((self.all >= (1.0 - _SAME) * self.amplification).sum())
 
     def __str__(self) -> str:
+        came = "a local maximum" if self.ended[int(np.nanargmax(self.all))] else (
+            "still climbing at its last step")
         return (f"worst pattern: amplification {self.amplification:.4f} of sector {self.sector} at "
-                f"{self.omega / (2.0 * np.pi):.6g} Hz; a local maximum, {self.agree} of "
+                f"{self.omega / (2.0 * np.pi):.6g} Hz; {came}, {self.agree} of "
                 f"{len(self.all)} starts come to it, {int(self.ended.sum())} have ended, the "
-                f"lowest at {self.all.min():.4f}")
+                f"lowest at {np.nanmin(self.all):.4f}")
 
 
 def worst_pattern(case: Case | str | Path, box: float = 0.05, *, starts: int | ArrayLike = 10,
