@@ -12,6 +12,7 @@ module fw_body
 
    public :: body_type
 
+   !> What vibrates: model, pairs, springs and other elements, without what is asked of them.
    type :: body_type
       type(model_type) :: model
       type(contact_type) :: contact

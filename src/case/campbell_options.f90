@@ -12,6 +12,7 @@ module fw_campbell_options
    !> Orders of one diagram.
    integer, parameter, public :: most_orders = 100
 
+   !> Speeds, engine orders, and what is solved at their crossings.
    type :: campbell_options
       !> Rotation speeds [rad/s].
       real(wp) :: start = -1.0_wp, end = -1.0_wp

@@ -83,6 +83,7 @@ module fw_case
       procedure :: bind_keys => bind_output_keys
    end type output_options
 
+   !> All that a run is asked for.
    type, extends(body_type) :: case_type
       character(:), allocatable :: title
       integer :: analysis = analysis_frf

@@ -12,6 +12,7 @@ module fw_mission_options
 
    integer, parameter :: most_blocks = 10000
 
+   !> Blocks of operation, how often they are flown, and how flights are leapt over.
    type :: mission_options
       !> Blocks of a flight; 0: no mission.
       integer :: n_blocks = 0

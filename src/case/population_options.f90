@@ -14,6 +14,7 @@ module fw_population_options
    !> More are taken for a mistake.
    integer, parameter :: most_patterns = 10000000
 
+   !> Which disks are solved, and over which of their blades.
    type :: population_options
       !> Of the patterns there are, the first ones (0: all).
       integer :: n_patterns = 0

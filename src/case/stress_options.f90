@@ -14,6 +14,7 @@ module fw_stress_options
    character(*), parameter :: output_words(*) = [character(6) :: 'points', 'tensor', 'none']
    integer, parameter :: of_points = 1, of_tensor = 2, of_nothing = 3
 
+   !> Which stress is found, and the limits of endurance that it is held against.
    type :: stress_options
       integer :: n_points = 0
       !> Six components after one another, point by point (6 n_points, n_dof) [force/length**3].

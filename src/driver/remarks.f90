@@ -63,6 +63,7 @@ contains
       call append(self%text, text)
    end subroutine add
 
+   !> How many there are until now.
    pure integer function count_remarks(self) result(n)
       class(remark_list), intent(in) :: self
 
@@ -485,6 +486,7 @@ contains
          'error (/floquet/error): more harmonics%n_harmonics make it certain')
    end subroutine remark_stability
 
+   !> How many more of a kind there are than the one that is shown.
    pure function others(n) result(words)
       integer, intent(in) :: n
       character(20) :: words

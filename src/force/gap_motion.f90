@@ -9,6 +9,7 @@ module fw_gap_motion
 
    public :: gap_motion, take_gap_motion
 
+   !> What is added to the constant gaps of the pairs.
    type :: gap_motion
       !> Harmonics above 0 (n_harmonics), and complex amplitudes a = cosine - i sine [length]
       !> (n_pairs, n_harmonics).

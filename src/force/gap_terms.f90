@@ -18,6 +18,7 @@ module fw_gap_terms
    !> More terms, or a higher harmonic, are taken for a mistake.
    integer, parameter :: most_terms = 1000000, most_harmonic = 100000
 
+   !> Gaps as a case gives them: harmonics or engine orders, amplitudes and phases.
    type :: gap_terms
       integer :: n_terms = 0
       !> Pairs, 0 for all; harmonics or orders (n_terms).

@@ -4,8 +4,8 @@
 !>
 !> Members that follow events keep doing so beside members that decide at instants.
 module fw_several_laws
-   use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed, pair_open, &
-      pair_stuck
+   use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed, &
+      pair_open, pair_stuck
    use fw_fourier, only: fourier_type, new_fourier
    use fw_gap_motion, only: gap_motion
    use fw_kinds, only: wp

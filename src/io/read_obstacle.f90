@@ -58,6 +58,7 @@ contains
       call add_gaps(terms, cyclic, n_pairs, contact)
    end subroutine read_obstacle
 
+   !> How fast side 2 slides, and whether its friction follows the path or has one direction.
    subroutine keys_of_sliding(reader, contact)
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(inout) :: contact

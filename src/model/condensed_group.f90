@@ -31,6 +31,7 @@ module fw_condensed_group
    !> Numbers of a group up to which it stays in the cache of a core.
    real(wp), parameter :: most_numbers = 65536.0_wp
 
+   !> Coordinates that no contact touches, condensed together.
    type :: condensed_group
       private
       !> Whether structure and size are such that this serves.

@@ -32,6 +32,7 @@ module fw_cyclic_structure
    !> More internal modes than any nodal diameter has.
    integer, parameter :: most_modes = 1000000
 
+   !> A sector under a travelling wave: harmonic n has the nodal diameter n times that of the wave.
    type, extends(structure_operator) :: cyclic_structure
       !> Bases of the nodal diameters in use; the one of each harmonic, and whether its conjugates
       !> act (n_retained).
@@ -64,6 +65,7 @@ module fw_cyclic_structure
       procedure :: structural_work
    end type cyclic_structure
 
+   !> Blocks of one frequency.
    type, extends(structure_state) :: cyclic_state
       type(harmonic_point), allocatable :: point(:)
       type(formed_stiffness) :: formed
@@ -491,6 +493,7 @@ contains
       end select
    end subroutine recover
 
+   !> Of a coordinate against all others held, in harmonic 0.
    pure real(wp) function static_stiffness(self, coordinate)
       class(cyclic_structure), intent(in) :: self
       integer, intent(in) :: coordinate

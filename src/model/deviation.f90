@@ -32,6 +32,7 @@ module fw_deviation
       real(wp), allocatable :: along(:), matrix(:, :)
    end type deviation_term
 
+   !> By how much sectors differ from the tuned one, as the user gives it.
    type :: deviation_type
       !> B (r, n_dof).
       real(wp), allocatable :: rows(:, :)

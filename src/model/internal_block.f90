@@ -10,6 +10,7 @@ module fw_internal_block
 
    public :: internal_block
 
+   !> The part of a structure that is condensed: its matrices, and their factors at one frequency.
    type :: internal_block
       !> D^-1, of coupled modes that of the diagonal without damping; 0 of a free mode (n_internal).
       complex(wp), allocatable :: inverse(:)

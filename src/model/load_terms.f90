@@ -19,6 +19,7 @@ module fw_load_terms
    !> More terms, a higher harmonic or a higher power are taken for a mistake.
    integer, parameter :: most_terms = 1000000, most_harmonic = 100000, most_power = 9
 
+   !> Loads as a case gives them, by harmonic or engine order.
    type :: load_terms
       integer :: n_terms = 0
       !> Signed dofs; harmonics or orders, and powers of the frequency (n_terms).

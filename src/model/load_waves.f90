@@ -36,6 +36,7 @@ module fw_load_waves
 
 contains
 
+   !> Waves that the load drives.
    pure integer function n_waves(self)
       class(load_waves), intent(in) :: self
 

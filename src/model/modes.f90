@@ -8,6 +8,7 @@ module fw_modes
 
    public :: mode_type, find_modes, least_width
 
+   !> A linear mode: frequency, damping and shape.
    type :: mode_type
       !> Natural frequency [rad/s].
       real(wp) :: omega = 0.0_wp

@@ -37,6 +37,7 @@ module fw_parameters
    !> What a value may be.
    integer, parameter :: any_sign = 0, not_negative = 1, positive = 2
 
+   !> A parameter: its name, its unit, and where it stands in a case.
    type :: parameter_type
       !> `group%key` of the key that holds the value.
       character(28) :: word

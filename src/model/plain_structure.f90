@@ -36,6 +36,7 @@ module fw_plain_structure
 
    public :: plain_structure, new_plain_structure
 
+   !> A structure that is no sector.
    type, extends(condensed_structure) :: plain_structure
       !> Whether Z_r is formed at each frequency.
       logical :: forms_blocks = .true.
@@ -60,6 +61,7 @@ module fw_plain_structure
       procedure :: dynamic_block
    end type plain_structure
 
+   !> Blocks of one frequency.
    type, extends(condensed_state) :: plain_state
       !> The one or the other.
       type(formed_stiffness) :: formed

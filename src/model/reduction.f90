@@ -15,6 +15,7 @@ module fw_reduction
 
    public :: reduction_type, new_reduction, held_basis, may_resonate_between
 
+   !> A plain structure, condensed to the coordinates of the joint.
    type :: reduction_type
       integer :: n_coordinates = 0
       integer :: n_internal = 0

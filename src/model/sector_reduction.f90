@@ -19,6 +19,7 @@ module fw_sector_reduction
 
    public :: sector_reduction, static_diagonal
 
+   !> The matrices of one nodal diameter, condensed to the coordinates of the joint.
    type :: sector_reduction
       !> Signed as the harmonics have it, or not: matrices are those of k = 0 .. N/2.
       integer :: nodal_diameter = 0
@@ -339,6 +340,7 @@ contains
       self%aero(:, :, 2) = congruence(t, nodal%aero(:, :, 2), t)
    end subroutine take_whirl
 
+   !> Whether the two directions of rotation differ: a gyroscopic or a circulatory part.
    pure logical function has_whirl(self)
       class(sector_reduction), intent(in) :: self
 

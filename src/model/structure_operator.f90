@@ -40,6 +40,7 @@ module fw_structure_operator
       procedure :: scale_loads
    end type structure_state
 
+   !> What a balance asks of a structure, whichever kind it is; it does not change in a run.
    type, abstract :: structure_operator
       integer :: n_coordinates = 0
       !> The first coordinates, relative displacements; behind them internal modes `kept`.

@@ -30,6 +30,7 @@ module fw_time_stepper
    !> Halvings that are worth their factors, whatever the number of steps.
    integer, parameter :: most_levels = 12
 
+   !> One period of a structure with contact as a map of its state, by implicit steps.
    type, extends(period_map) :: time_stepper
       type(time_structure) :: structure
       !> [rad/time] of the load.
