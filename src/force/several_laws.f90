@@ -4,8 +4,8 @@
 !>
 !> Members that follow events keep doing so beside members that decide at instants.
 module fw_several_laws
-   use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed, pair_open, &
-      pair_stuck
+   use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed, &
+      pair_open, pair_stuck
    use fw_fourier, only: fourier_type
    use fw_gap_motion, only: gap_motion
    use fw_kinds, only: wp
@@ -455,8 +455,9 @@ contains
                work%linear_state(at) = own%linear_state
                work%linear_rests(at) = own%linear_rests
                do i = 1, size(at)
-                  if (own%linear_state(i) == pair_mixed) &
+                  if (own%linear_state(i) == pair_mixed) then
                      work%jacobian(:, :, at(i)) = own%jacobian(:, :, i)
+                  end if
                   if (.not. self%leans(at(i))) cycle
                   work%linear_rests(at(i)) = .false.
                   call lean_block(self%lean(at(i), :), fourier%n_coefficients, &

@@ -13,9 +13,9 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (107392, 1000),
-    "files of src": (461, 10),
-    "lines of the longest file": (788, 50),
+    "lines of src": (108700, 1000),
+    "files of src": (464, 10),
+    "lines of the longest file": (802, 50),
     "modules used by one file, at most": (32, 2),
     "files that name forces%pairs": (42, 0),
     "files that name case_type": (61, 0),
