@@ -44,6 +44,8 @@ UNITS: dict[str, str] = {
     "contact%normal_load": "F",
     "contact%gap_rotation": "L s^2",
     "contact%normal_load_rotation": "F s^2",
+    "contact%speed_1": "L/s",
+    "contact%speed_2": "L/s",
     "contact%tangential_stiffness": "F/L",
     "contact%normal_stiffness": "F/L",
     "contact%normal_coefficient": "F/L^e",
@@ -52,8 +54,8 @@ UNITS: dict[str, str] = {
     "contact%slip_speed": "L/s",
     "contact%weakening_speed": "L/s",
     "contact%mu_viscous": "s/L",
-    "contact%speed_1": "L/s",
-    "contact%speed_2": "L/s",
+    "contact%gap_amplitude": "L",
+    "contact%gap_phase": "degrees",
     "spring%coefficient": "F/L^power",
     "load%static": "F",
     "load%cosine": "F",
@@ -323,6 +325,12 @@ class Contact(TypedDict, total=False):
     #: [F s^2] added to normal_load, for each (rad/s)^2 of the rotation speed; only: rotation_speed,
     #: speed_order, campbell (default: of the file, else none)
     normal_load_rotation: ArrayLike
+    #: [L/s] velocity of side 2 along t1: a belt, a disk or a casing; only: law = 'dlft',
+    #: 'dlft_velocity', 'penalty', 'rigid', 'regulari (default: of the file, else 0)
+    speed_1: ArrayLike
+    #: [L/s] the same along t2; only: law = 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regulari
+    #: (default: of the file, else 0)
+    speed_2: ArrayLike
     #: [F/L] contact stiffness; 0 with a parallel pair that has one, or without a tangential dof;
     #: only: law = 'penalty', 'iwan', 'bouc_wen' (default: of the file, else required with
     #: tangential dofs)
@@ -358,11 +366,6 @@ class Contact(TypedDict, total=False):
     #: [s/L] what mu gains with the sliding speed; only: law = 'regularised' (default: of the file,
     #: else 0)
     mu_viscous: ArrayLike
-    #: [L/s] velocity of side 2 along t1: a belt or a disk; only: law = 'regularised' (default: of
-    #: the file, else 0)
-    speed_1: ArrayLike
-    #: [L/s] the same along t2; only: law = 'regularised' (default: of the file, else 0)
-    speed_2: ArrayLike
     #: exponent of the sliding limits: the work of a small cycle grows with amplitude**(chi + 3);
     #: only: law = 'iwan' (default: of the file, else required with tangential dofs)
     iwan_chi: ArrayLike
@@ -381,6 +384,23 @@ class Contact(TypedDict, total=False):
     #: where pairs that never slip start: unstrained, or as the last point ended (default:
     #: 'assembly')
     memory: Literal["assembly", "carried"]
+    #: what moves the obstacle, or makes it uneven: terms added to gap (default: 0)
+    n_gap_terms: int
+    #: pair, from 1; 0: all (default: 0)
+    gap_pair: ArrayLike
+    #: harmonic, 0 to n_harmonics (default: 1, or by gap_order)
+    gap_harmonic: ArrayLike
+    #: orders in place of harmonics: the frequency of the sweep is their greatest common divisor
+    #: times the speed (default: gap_harmonic)
+    gap_order: ArrayLike
+    #: [L] amplitude; where it is positive the gap is widest at n tau = -gap_phase (required with
+    #: n_gap_terms)
+    gap_amplitude: ArrayLike
+    #: [degrees] of cos(n tau + phase) (default: 0)
+    gap_phase: ArrayLike
+    #: how friction follows speed_1, speed_2: along the path that they add to the vibration, or
+    #: against them whatever it is (default: 'path')
+    sliding: Literal["path", "steady"]
     #: result file of a wear run: start from the depths that it ends with, on top of gap (default:
     #: none)
     worn: str

@@ -177,8 +177,8 @@ contains
                   end associate
                end do
             end do
-            call add_speeds(state, state%problem%forces%entry(pairs)%law%prediction, force, weight, &
-                            work, row)
+            call add_speeds(state, state%problem%forces%entry(pairs)%law%prediction, force, &
+                            weight, work, row)
          end associate
       end associate
       row%value = sum(weight*work)

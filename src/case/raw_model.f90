@@ -208,8 +208,8 @@ contains
                         'side 1'), pairs%sector_2)
       call to%bind(part('contact/mu', each, 'friction coefficient'), pairs%mu)
       call to%bind(part('contact/gap', each, 'initial gap; negative: interference'), pairs%gap)
-      call to%bind(part('contact/gap_harmonic', 'gap', 'harmonics 0, 1, .. that an obstacle adds '// &
-                        'to the gaps'), pairs%gap_harmonic)
+      call to%bind(part('contact/gap_harmonic', 'gap', 'harmonics 0, 1, .. that an obstacle '// &
+                        'adds to the gaps'), pairs%gap_harmonic)
       call to%bind(part('contact/gap_cosine', 'gap pair', 'their cosine parts, which open', &
                         storage=by_columns), pairs%gap_cosine)
       call to%bind(part('contact/gap_sine', 'gap pair', 'their sine parts', storage=by_columns), &

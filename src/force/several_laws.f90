@@ -489,8 +489,9 @@ contains
                work%linear_state(at) = own%linear_state
                work%linear_rests(at) = own%linear_rests
                do i = 1, size(at)
-                  if (own%linear_state(i) == pair_mixed) &
+                  if (own%linear_state(i) == pair_mixed) then
                      work%jacobian(:, :, at(i)) = own%jacobian(:, :, i)
+                  end if
                   if (.not. self%leans(at(i))) cycle
                   work%linear_rests(at(i)) = .false.
                   call lean_block(self%lean(at(i), :), fourier%n_coefficients, &

@@ -15,11 +15,11 @@ module fw_read_case
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: is_of_matrices, is_of_sectors
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
-   use fw_read_elements, only: read_contact, read_elements, read_springs, user_element
+   use fw_read_elements, only: check_gap_orders, read_contact, read_elements, read_obstacle, &
+      read_springs, user_element
    use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
-   use fw_read_obstacle, only: check_gap_orders, read_obstacle
    use fw_read_options, only: read_campbell, read_harmonics, read_mission, read_mode, &
       read_population, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed

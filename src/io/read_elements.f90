@@ -6,13 +6,15 @@ module fw_read_elements
    use fw_elements, only: element_list
    use fw_error, only: error_type, fatal_error, status_input
    use fw_read_contact, only: read_contact, read_springs
+   use fw_read_obstacle, only: check_gap_orders, read_obstacle
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_user_element, only: user_element
    implicit none (type, external)
    private
 
-   public :: read_contact, read_elements, read_springs, user_element
+   public :: check_gap_orders, read_contact, read_elements, read_obstacle, read_springs, &
+             user_element
 
 contains
 

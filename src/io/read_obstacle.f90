@@ -95,7 +95,8 @@ contains
          return
       end do
       if (.not. (allocated(contact%gap_cosine) .or. allocated(contact%gap_sine))) then
-         call reader%refuse_model('contact/gap_harmonic, which needs contact/gap_cosine or gap_sine')
+         call reader%refuse_model('contact/gap_harmonic, which needs contact/gap_cosine or '// &
+                                  'gap_sine')
          return
       end if
       call check_rows('gap_cosine', contact%gap_cosine)

@@ -57,7 +57,7 @@ def law_modules() -> set[str]:
     """Modules of laws that nobody outside of the laws needs: multipliers follow `fw_friction`, and
     checks ask which pairs have the constants of a normal law."""
     return uses(LAWS) - {"fw_contact_data", "fw_force_law", "fw_pair_law", "fw_friction",
-                         "fw_normal_law"}
+                         "fw_normal_law", "fw_kinds"}
 
 
 #: Outside of the laws a law is known by its facts and its prediction. A name of one, or a question
