@@ -56,6 +56,8 @@ class ContactPairs:
         Constant compressive force of pairs without a normal dof [force].
     gap_rotation, normal_load_rotation : float or (n_pairs,), optional
         What each square of the rotation speed adds to them [length s^2], [force s^2].
+    slider_1, slider_2 : float or (n_pairs,), optional
+        Displacement along t1 and t2 where an assembled pair is unstrained [length], 0 by default.
     tangential_stiffness, normal_stiffness : float or (n_pairs,), optional
         Stiffness of the elastic law ('penalty') [force/length]; the tangential one also that of
         the laws of hysteresis ('iwan', 'bouc_wen') for the smallest motion.
@@ -129,6 +131,8 @@ class ContactPairs:
     normal_load_rotation: ArrayLike | None = None
     sliding: str | None = None
     gap_harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None
+    slider_1: ArrayLike | None = None
+    slider_2: ArrayLike | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -701,8 +705,8 @@ _GAPS = ("contact/gap_harmonic", "contact/gap_cosine", "contact/gap_sine")
 _SLIDES = ("path", "steady")
 _HYSTERESIS = ("iwan_chi", "iwan_beta", "bouc_wen_exponent", "bouc_wen_beta")
 _PRESSING = ("normal_coefficient", "normal_exponent", "reference_force", "decay_length")
-_IN_NAMELIST = ("normal_load", "gap_rotation", "normal_load_rotation", "tangential_stiffness",
-                "normal_stiffness", *_PRESSING, *_SLIDING, *_HYSTERESIS)
+_IN_NAMELIST = ("normal_load", "gap_rotation", "normal_load_rotation", "slider_1", "slider_2",
+                "tangential_stiffness", "normal_stiffness", *_PRESSING, *_SLIDING, *_HYSTERESIS)
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
 

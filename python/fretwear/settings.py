@@ -56,6 +56,10 @@ UNITS: dict[str, str] = {
     "contact%mu_viscous": "s/L",
     "contact%gap_amplitude": "L",
     "contact%gap_phase": "degrees",
+    "contact%speed_1": "L/s",
+    "contact%speed_2": "L/s",
+    "contact%slider_1": "L",
+    "contact%slider_2": "L",
     "spring%coefficient": "F/L^power",
     "load%static": "F",
     "load%cosine": "F",
@@ -401,6 +405,11 @@ class Contact(TypedDict, total=False):
     #: how friction follows speed_1, speed_2: along the path that they add to the vibration, or
     #: against them whatever it is (default: 'path')
     sliding: Literal["path", "steady"]
+    #: [L] displacement along t1 where an assembled pair is unstrained; of those that never slip
+    #: (default: of the file, else 0)
+    slider_1: ArrayLike
+    #: [L] the same along t2 (default: of the file, else 0)
+    slider_2: ArrayLike
     #: result file of a wear run: start from the depths that it ends with, on top of gap (default:
     #: none)
     worn: str

@@ -450,7 +450,8 @@ contains
       if (contact%n_pairs > 0) then
          facts = facts_of(contact)
          symmetric = symmetric .and. facts%is_odd .and. all(joint%row(3, :) == 0) .and. &
-                     contact%memory /= memory_carried
+                     contact%memory /= memory_carried .and. &
+                     .not. (allocated(contact%slider_1) .or. allocated(contact%slider_2))
       end if
       if (springs%n_springs > 0) symmetric = symmetric .and. all(modulo(springs%power, 2) == 1)
       symmetric = symmetric .and. elements%are_odd()

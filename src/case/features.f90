@@ -249,6 +249,11 @@ contains
          asked = allocated(case%model%base_parts)
       case ('states of a law of a user')
          asked = has_states(case)
+      case ('a law that does not remember where pairs start')
+         asked = pairs .and. .not. facts%remembers
+      case ('contact%slider_1 or slider_2')
+         asked = pairs .and. (allocated(case%contact%slider_1) .or. &
+                              allocated(case%contact%slider_2))
       case ("contact%memory = 'carried'")
          asked = pairs .and. case%contact%memory == memory_carried
       case (moving_gaps)

@@ -15,7 +15,7 @@ module fw_held_bodies
    implicit none (type, external)
    private
 
-   public :: body_hold, check_bodies, find_hold, pairs_of_bodies
+   public :: are_of_bodies, body_hold, check_bodies, find_hold, pairs_of_bodies
 
    !> How one body is held.
    type :: body_hold
@@ -80,6 +80,31 @@ contains
          where (hold%touches) body_of_pair = i
       end do
    end subroutine pairs_of_bodies
+
+   !> Which observed quantities show bodies alone that springs do not hold: their own motions have
+   !> no damping.
+   function are_of_bodies(case) result(are)
+      class(body_type), intent(in) :: case
+      logical, allocatable :: are(:)
+      real(wp), allocatable :: motion(:, :)
+      logical :: has_springs, is_body(case%model%n_dof)
+      integer :: i, n
+
+      n = size(case%model%observe_matrix, 1)
+      allocate (are(case%model%n_observed()), source=.false.)
+      if (.not. allocated(case%bodies)) return
+      is_body = .false.
+      do i = 1, case%bodies%count()
+         call find_motion(case, pack(case%bodies%dof(:, i), case%bodies%dof(:, i) /= 0), motion, &
+                          has_springs)
+         if (.not. has_springs) is_body = is_body .or. any(abs(motion) > 0.0_wp, dim=2)
+      end do
+      do i = 1, size(are)
+         associate (row => abs(case%model%observe_matrix(modulo(i - 1, n) + 1, :)) > 0.0_wp)
+            are(i) = any(row) .and. .not. any(row .and. .not. is_body)
+         end associate
+      end do
+   end function are_of_bodies
 
    !> What holds one body: springs, or pairs, whose forces have to carry its load.
    subroutine find_hold(case, number, hold)

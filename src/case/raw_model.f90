@@ -215,6 +215,9 @@ contains
       call to%bind(part('contact/gap_sine', 'gap pair', 'their sine parts', storage=by_columns), &
                    pairs%gap_sine)
       call to%bind(part('contact/area', each, 'of a pair'), pairs%area)
+      call to%bind(part('contact/slider_1', each, 'displacement along t1 where an assembled '// &
+                        'pair is unstrained'), pairs%slider_1)
+      call to%bind(part('contact/slider_2', each, 'the same along t2'), pairs%slider_2)
       call to%bind(part('contact/normal_load', each, 'constant compressive force of pairs '// &
                         'without a normal dof'), pairs%normal_load)
       call to%bind(part('contact/gap_rotation', each, 'added to the gap, for each square of '// &

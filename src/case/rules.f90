@@ -82,7 +82,16 @@ module fw_rules
       rule_type('harmonics%accuracy', 'output%histories', &
                 'they have one length: leave it out, and give n_harmonics and n_time as large '// &
                 'as a run with accuracy reports'), &
-      rule_type('harmonics%accuracy', "contact%memory = 'carried'", "use 'assembly'")]
+      rule_type('harmonics%accuracy', "contact%memory = 'carried'", "use 'assembly'"), &
+      rule_type('contact%slider_1 or slider_2', "contact%memory = 'carried'", "use 'assembly'"), &
+      rule_type('contact%slider_1 or slider_2', "case%analysis = 'time'", "use 'frf' or 'point'"), &
+      rule_type('contact%slider_1 or slider_2', "case%analysis = 'mode'", 'leave it out'), &
+      rule_type('contact%slider_1 or slider_2', 'a law that does not remember where pairs start', &
+                "use 'penalty' or 'dlft'"), &
+      rule_type('contact%slider_1 or slider_2', &
+                'a law of hysteresis, whose paths start at the assembly', 'leave it out'), &
+      rule_type('contact%slider_1 or slider_2', 'a law that takes integrals between its events', &
+                "use 'penalty' or 'dlft'")]
 
    !> The factor of the load is an unknown of its own: what follows solves without such a border,
    !> or for a load that the case gives.

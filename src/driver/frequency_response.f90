@@ -11,12 +11,13 @@ module fw_frequency_response
    use fw_error, only: error_type
    use fw_explanation, only: failure_list
    use fw_given_amplitude, only: given_amplitude
+   use fw_held_bodies, only: are_of_bodies
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_motion, only: motion_type
    use fw_one_level, only: one_level
    use fw_pair_cycle, only: pair_cycle
-   use fw_peak, only: peak_type
+   use fw_peak, only: found_unresolved, peak_type
    use fw_peak_group, only: peak_group
    use fw_peak_finder, only: peak_finder
    use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_open, remark_peaks, &
@@ -289,6 +290,7 @@ contains
          select type (source => self%source)
          type is (branch_source)
             call source%peaks%list(source%first_row, peaks)
+            call drop_ripples(case, peaks)
             call source%at_highest(case, highest, error)
             if (.not. allocated(error)) call keeper%take(highest, error)
             if (allocated(error)) return
@@ -298,6 +300,7 @@ contains
             call finder%search(case, error)
             if (allocated(error)) return
             call finder%peaks(peaks)
+            call drop_ripples(case, peaks)
             call keeper%solve_at_peak(case, finder, self%strategy, run%observer, peaks, error)
             if (allocated(error)) return
             call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
@@ -312,6 +315,19 @@ contains
       end associate
       call run%writer%add(group, error)
    end subroutine find_peaks
+
+   !> Ripples of what bodies do that no spring holds, without damping, are no maxima to look for.
+   subroutine drop_ripples(case, peaks)
+      type(case_type), intent(in) :: case
+      type(peak_type), allocatable, intent(inout) :: peaks(:)
+      logical, allocatable :: are(:)
+      integer :: i
+
+      if (.not. allocated(case%bodies)) return
+      are = are_of_bodies(case)
+      peaks = peaks(pack([(i, i=1, size(peaks))], &
+                         .not. (are(peaks%observed) .and. peaks%found_by == found_unresolved)))
+   end subroutine drop_ripples
 
    !> How the case wants its points solved.
    subroutine new_strategy(case, strategy)

@@ -74,6 +74,9 @@ module fw_contact_data
       type(worn_friction), allocatable :: worn_friction
       !> Where the march through the period starts.
       integer :: memory = memory_assembly
+      !> Tangential displacements of unstrained pairs, along t1 and t2 (n_pairs) [length]: 0 where
+      !> they are not allocated.
+      real(wp), allocatable :: slider_1(:), slider_2(:)
       !> Coordinates of the pairs, for pictures (3, n_pairs), and the names of their patches.
       real(wp), allocatable :: position(:, :)
       type(string_type), allocatable :: patch(:)
@@ -130,6 +133,8 @@ contains
       call level_values(self%n_alike, self%normal_load)
       call level_values(self%n_alike, self%gap_rotation)
       call level_values(self%n_alike, self%normal_load_rotation)
+      call level_values(self%n_alike, self%slider_1)
+      call level_values(self%n_alike, self%slider_2)
       call level_values(self%n_alike, self%tangential_stiffness)
       call level_values(self%n_alike, self%normal_stiffness)
       call self%constants%level(self%n_alike)

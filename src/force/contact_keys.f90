@@ -6,7 +6,7 @@
 !> namelist has none.
 module fw_contact_keys
    use fw_contact_data, only: contact_type, spring_type, memory_words
-   use fw_key, only: key, key_visitor
+   use fw_key, only: key, key_type, key_visitor
    use fw_key_range, only: above, at_least, side_numbers, from_to
    use fw_kinds, only: wp
    use fw_laws, only: law_help, law_words, laws_of, new_law, pairs_of_law
@@ -237,6 +237,18 @@ contains
                      contact%penalty_scale)
       call keys%bind_word(key('memory', 'where pairs that never slip start: unstrained, or as '// &
                               'the last point ended'), contact%memory, memory_words)
+      call keys%bind(slider('slider_1', 'displacement along t1 where an assembled pair is '// &
+                            'unstrained; of those that never slip'), contact%slider_1)
+      call keys%bind(slider('slider_2', 'the same along t2'), contact%slider_2)
+
+   contains
+
+      pure type(key_type) function slider(name, help)
+         character(*), intent(in) :: name, help
+
+         slider = key(name, help, unit='L', shape='n_pairs', absent='of the file, else 0')
+      end function slider
+
    end subroutine bind_march
 
    !> The depth that an earlier run of wear ended with.

@@ -79,6 +79,8 @@ contains
          call repeat_values(n_file, n_sectors, contact%normal_load)
          call repeat_values(n_file, n_sectors, contact%gap_rotation)
          call repeat_values(n_file, n_sectors, contact%normal_load_rotation)
+         call repeat_values(n_file, n_sectors, contact%slider_1)
+         call repeat_values(n_file, n_sectors, contact%slider_2)
          call contact%constants%offer_all(file_pairs%constants, n_file, n_sectors)
       else if (n_file > 0 .and. contact%n_pairs > 0 &
                .and. .not. reader%given('contact', 'side_1')) then

@@ -208,6 +208,17 @@ def test_remarks(tmp_path):
     assert "body turns" in names(wedge(**single))
 
 
+def test_ripples_of_a_body_are_no_peaks(tmp_path):
+    """A light body has motions of its own without damping, at which harmonics ripple."""
+    wedge(mass=1e-4, inertia=1e-9).to_hdf5(tmp_path / "model.h5")
+    sweep = {"start": 60.0, "end": 160.0, "n_points": 101}
+    run(tmp_path, with_model(at(0.0) | {"case": {"analysis": "frf"}, "sweep": sweep}))
+    with h5py.File(tmp_path / "case.h5") as file:
+        observed, found = file["peak/observed"][()], file["peak/found_by"][()]
+    # Those of the blades stand in front of those of the body.
+    assert not np.any(found[observed > 3] == 4) and np.any(observed > 3)
+
+
 def test_mass_of_the_case(tmp_path):
     """&body mass in place of that of the model, as a model of that mass."""
     light = solved(wedge(mass=0.03), tmp_path)

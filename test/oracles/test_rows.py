@@ -23,10 +23,10 @@ def far(found, wanted):
     return np.abs(found - wanted).max() / np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("name", ["v1_wedge_rows", "v2_wedge_wave"])
+@pytest.mark.parametrize("name", ["v1_wedge_rows", "v2_wedge_wave", "v3_wedge_compliance"])
 def test_reference(name, tmp_path):
-    """A wedge between two blades, and one in each sector of a wave: a body of three dofs that
-    touches two flanks, by an own harmonic balance in numpy."""
+    """A wedge between two blades, one in each sector of a wave, and one with nodes behind springs whose
+    rigid pairs are assembled under tension, by an own harmonic balance in numpy."""
     oracle = json.loads((FOLDER / f"{name}.json").read_text())
     for number, point in enumerate(oracle["points"]):
         folder = tmp_path / str(number)
