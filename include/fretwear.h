@@ -231,7 +231,7 @@ int fw_count(fw_handle handle, const char *what, int *n);
    "blades/content" (n_quantities, n_sectors)
    (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)
    (n_pairs, 3):          "contact/fraction" of the period in stick, slip and open
-   (n_pairs):             "contact/dissipation", energy per cycle
+   (n_pairs):             "contact/dissipation", "contact/obstacle_work", energy per cycle
    (2H+1, laws, n_in):    "user/force" of laws of your own, and (laws): "user/work" per cycle
    "history/observed", "history/force", "history/relative_displacement",
    "floquet/multipliers", "floquet/stable": where the case asks for them.

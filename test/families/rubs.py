@@ -14,7 +14,7 @@ directions or not at all, on the path or steadily. Tips have mass (`penalty`, `r
 
 The judge takes the displacements and forces of the result. It marches every pair by itself, with
 its anchor carried along, from instant to instant until a turn repeats, and holds the harmonics of
-these forces against those of the result (1e-6 of the largest; of events by 8,192 instants 1e-4).
+these forces against those of the result (1e-6 of the largest; of events by 32,768 instants 1e-4).
 The balance of every harmonic has to hold within 1e-7 of its largest term, the work of loads and
 obstacles to be that of friction and damping within 1e-8, and friction not to give energy.
 """
@@ -184,7 +184,7 @@ def trial(seed, program, folder):
         heat = file["contact/dissipation"][0]
         brought = file["contact/obstacle_work"][0] if "contact/obstacle_work" in file else 0.0
     found["solved"] = 1
-    n_time = 8192 if case["events"] else case["n_time"]
+    n_time = 32768 if case["events"] else case["n_time"]
     tau = 2.0 * np.pi * np.arange(n_time) / n_time
     waves = np.array([np.ones(n_time)] + [f(h * tau) for h in range(1, case["harmonics"] + 1)
                                           for f in (np.cos, np.sin)])

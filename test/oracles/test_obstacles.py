@@ -207,6 +207,42 @@ def test_events_agree_with_many_instants(tmp_path):
                     run_case(tmp_path, fine).coefficients) < 1e-5
 
 
+# Another program part, which shares the pairs alone: 7e-6 with H = 25.
+def test_integration_in_time_agrees(tmp_path):
+    groups = oracle("v4_rub_path")["groups"]
+    balance = at(groups, 100.0)
+    balance["harmonics"] |= {"n_harmonics": 25, "n_time": 1024}
+    march = merged(balance, {"case": {"analysis": "time"}, "solver": {"tolerance": 1e-8},
+                             "time": {"steps_per_period": 2048, "n_periods": 400}})
+    march["harmonics"] = {"n_harmonics": 25}
+    found, wanted = run_case(tmp_path, balance), run_case(tmp_path, march)
+    assert distance(found.coefficients, wanted.coefficients) < 1e-4
+    assert distance(found.dissipation, wanted.dissipation) < 1e-3
+    assert distance(found.obstacle_work, wanted.obstacle_work) < 1e-3
+
+
+# A wave is that of all sectors, each with its gap later than the one before: by 128 of 320 instants.
+def test_a_wave_is_that_of_all_sectors(tmp_path):
+    case = {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": 3, "mass": np.diag([0.5, 1.0, 0.5]), "stiffness": np.array(
+            [[2.0, -1.0, -0.5], [-1.0, 2.0, -1.0], [-0.5, -1.0, 2.0]]),
+            "damping": 0.05 * np.eye(3)},
+        "cyclic": {"n_sectors": 5, "engine_order": 2, "n_interface": 1,
+                   "left": 1, "right": 3},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [0, 0, 2], "gap": 0.2,
+                    "normal_stiffness": 1.5, "n_gap_terms": 2, "gap_harmonic": [1, 3],
+                    "gap_amplitude": [0.5, 0.3], "gap_phase": [0.0, 70.0]},
+        "load": {"cosine": [0.0, 0.5, 0.0]},
+        "harmonics": {"n_harmonics": 7, "n_time": 320, "sampling": "uniform"},
+        "sweep": {"start": 1.1}, "solver": {"tolerance": 1e-12}}
+    wave = run_case(tmp_path, case)
+    disk = run_case(tmp_path, merged(case, {"cyclic": {"mistuned": True}}))
+    assert distance(disk.force[0][:, 0], wave.force[0][:, 0]) < 1e-9
+    later = shifted(wave.force[0][:, 0, 2], 2.0 * np.pi * 2 / 5)
+    assert distance(disk.force[0][:, 1, 2], later) < 1e-9
+
+
 def bad(**contact):
     return {"contact": contact}
 
