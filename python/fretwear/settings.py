@@ -54,12 +54,10 @@ UNITS: dict[str, str] = {
     "contact%slip_speed": "L/s",
     "contact%weakening_speed": "L/s",
     "contact%mu_viscous": "s/L",
-    "contact%gap_amplitude": "L",
-    "contact%gap_phase": "degrees",
-    "contact%speed_1": "L/s",
-    "contact%speed_2": "L/s",
     "contact%slider_1": "L",
     "contact%slider_2": "L",
+    "contact%gap_amplitude": "L",
+    "contact%gap_phase": "degrees",
     "spring%coefficient": "F/L^power",
     "load%static": "F",
     "load%cosine": "F",
@@ -388,6 +386,11 @@ class Contact(TypedDict, total=False):
     #: where pairs that never slip start: unstrained, or as the last point ended (default:
     #: 'assembly')
     memory: Literal["assembly", "carried"]
+    #: [L] displacement along t1 where an assembled pair is unstrained; of those that never slip
+    #: (default: of the file, else 0)
+    slider_1: ArrayLike
+    #: [L] the same along t2 (default: of the file, else 0)
+    slider_2: ArrayLike
     #: what moves the obstacle, or makes it uneven: terms added to gap (default: 0)
     n_gap_terms: int
     #: pair, from 1; 0: all (default: 0)
@@ -405,11 +408,6 @@ class Contact(TypedDict, total=False):
     #: how friction follows speed_1, speed_2: along the path that they add to the vibration, or
     #: against them whatever it is (default: 'path')
     sliding: Literal["path", "steady"]
-    #: [L] displacement along t1 where an assembled pair is unstrained; of those that never slip
-    #: (default: of the file, else 0)
-    slider_1: ArrayLike
-    #: [L] the same along t2 (default: of the file, else 0)
-    slider_2: ArrayLike
     #: result file of a wear run: start from the depths that it ends with, on top of gap (default:
     #: none)
     worn: str
