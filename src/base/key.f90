@@ -31,7 +31,7 @@ module fw_key
       !> Where the default is not that of the component: what stands for it, or when there is none.
       character(60) :: absent = ''
       !> What it has a meaning with only.
-      character(60) :: only = ''
+      character(100) :: only = ''
       type(range_type) :: range
    end type key_type
 

@@ -2,8 +2,8 @@
 !> orders meet them, and the maximum of the response along the order near each crossing.
 !>
 !> An engine order e excites the nodal diameter k = e modulo N, folded to (-N/2, N/2], with the
-!> frequency abs(e) Omega in the rotating frame. Each order is a case of its own, a sweep whose speed
-!> follows the frequency along that order; the frequencies come from its matrices too.
+!> frequency abs(e) Omega in the rotating frame. Each order is a case of its own, a sweep whose
+!> speed follows the frequency along that order; the frequencies come from its matrices too.
 module fw_run_campbell
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
    use fw_analysis, only: analysis, run_type

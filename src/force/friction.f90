@@ -351,7 +351,7 @@ contains
          work%turns(first:last) = 1
          return
       end if
-      if (any(self%prediction%drags([(i, i=first, last)]))) then
+      if (allocated(self%prediction%speed)) then
          do i = first, last
             if (self%prediction%drags(i)) then
                call march_along(self, work, room, n_time, i)

@@ -311,8 +311,9 @@ contains
                                           merge(90.0_wp, 0.0_wp, pull%is_hysteretic))
       if (self%harmonic(term) == 0) then
          ! A constant has no derivatives, and is none but of a constant acceleration.
-         if (power == 0 .and. pull%growth == 0 .and. .not. pull%is_hysteretic) &
+         if (power == 0 .and. pull%growth == 0 .and. .not. pull%is_hysteretic) then
             model%load_static = model%load_static + static_scale*parts(1)*pull%force
+         end if
          return
       end if
       ! The speed is omega/order: a power of the frequency n omega over n order.
