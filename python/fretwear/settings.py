@@ -328,10 +328,10 @@ class Contact(TypedDict, total=False):
     #: speed_order, campbell (default: of the file, else none)
     normal_load_rotation: ArrayLike
     #: [L/s] velocity of side 2 along t1: a belt, a disk or a casing; only: law = 'dlft',
-    #: 'dlft_velocity', 'penalty', 'rigid', 'regulari (default: of the file, else 0)
+    #: 'dlft_velocity', 'penalty', 'rigid', 'regularised' (default: of the file, else 0)
     speed_1: ArrayLike
-    #: [L/s] the same along t2; only: law = 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regulari
-    #: (default: of the file, else 0)
+    #: [L/s] the same along t2; only: law = 'dlft', 'dlft_velocity', 'penalty', 'rigid',
+    #: 'regularised' (default: of the file, else 0)
     speed_2: ArrayLike
     #: [F/L] contact stiffness; 0 with a parallel pair that has one, or without a tangential dof;
     #: only: law = 'penalty', 'iwan', 'bouc_wen' (default: of the file, else required with

@@ -47,9 +47,9 @@ def test_a_misspelled_part_is_refused_with_the_name_that_was_meant(case, old, ne
     ("unit_system", "did you mean attribute unit_system of /?"),
     ("contact/stick", "expected there: side_1, side_2, sector_2, mu, gap, gap_harmonic, gap_cosine, "
                       "gap_sine, area, slider_1, slider_2, normal_load, "
-                      "gap_rotation, normal_load_rotation, tangential_stiffness, normal_stiffness, normal_coefficient, normal_exponent, "
+                      "gap_rotation, normal_load_rotation, speed_1, speed_2, tangential_stiffness, normal_stiffness, normal_coefficient, normal_exponent, "
                       "reference_force, decay_length, slip_speed, mu_dynamic, weakening_speed, "
-                      "weakening_exponent, mu_viscous, speed_1, speed_2, iwan_chi, iwan_beta, "
+                      "weakening_exponent, mu_viscous, iwan_chi, iwan_beta, "
                       "bouc_wen_exponent, bouc_wen_beta, law, normal_law, table, position, patch"),
     ("load/harmonic_sine", "needs /load/harmonic"), ("mesh/point", "did you mean /mesh/points?"),
     ("nodal_diameter/0/mass", "/nodal_diameter needs attribute n_physical of /cyclic"),
