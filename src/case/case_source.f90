@@ -9,6 +9,7 @@ module fw_case_source
 
    public :: case_source
 
+   !> What the matrices of a case were formed from, kept where they change from point to point.
    type :: case_source
       character(:), allocatable :: path
       !> Not allocated where the path names the file.

@@ -26,6 +26,7 @@ module fw_cyclic_parts
       procedure :: bind_parts => bind_diameter
    end type nodal_parts
 
+   !> Parts of a model file that sectors have beside those of a plain structure.
    type :: cyclic_parts
       !> 0: the model is no sector.
       integer :: n_sectors = 0

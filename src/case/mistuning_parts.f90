@@ -16,6 +16,7 @@ module fw_mistuning_parts
       character(:), allocatable :: kind
    end type sector_parts
 
+   !> Parts of a model file by which sectors differ.
    type :: mistuning_parts
       !> Rows of blade modes (n_rows, n_dof), and their frequencies [rad/s].
       real(wp), allocatable :: rows(:, :), row_omega(:)

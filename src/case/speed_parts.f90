@@ -15,6 +15,7 @@ module fw_speed_parts
       real(wp), allocatable :: stiffness(:, :), static(:)
    end type speed_point
 
+   !> Matrices of a model at several rotation speeds.
    type :: speed_parts
       !> Speeds [rad/s], and what the model is there; that of number I at place I + 1.
       real(wp), allocatable :: value(:)

@@ -8,6 +8,7 @@ module fw_stress_parts
 
    public :: stress_parts
 
+   !> Rows of the stress, and where its points are.
    type :: stress_parts
       !> Stress xx, yy, zz, xy, yz, zx per dof (n_dof, 6, n_points) [force/length**3]; of matrices
       !> of nodal diameters it stands with these.

@@ -10,6 +10,7 @@ module fw_blade_patterns
 
    public :: blade_patterns
 
+   !> Deviations of the disks of a population.
    type :: blade_patterns
       !> Rows W (n_rows, n_dof) and their frequencies [rad/s].
       real(wp), allocatable :: rows(:, :), row_omega(:)

@@ -80,6 +80,7 @@ module fw_cyclic_data
       procedure :: in_basis
    end type nodal_speed
 
+   !> How many sectors there are, what joins them, and which wave is solved for.
    type :: cyclic_type
       logical :: is_cyclic = .false.
       !> Whether it is so for its matrices alone: one sector, which no neighbour has.

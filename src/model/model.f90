@@ -25,6 +25,7 @@ module fw_model
       logical :: is_loss = .false.
    end type matrix_change
 
+   !> The matrices, loads and observed quantities of a structure.
    type :: model_type
       integer :: n_dof = 0
       !> Mass, stiffness and viscous damping (n_dof, n_dof), symmetric. Effective values: the

@@ -35,6 +35,7 @@ module fw_real_products
       real(wp), allocatable :: s(:)
    end type harmonic_factors
 
+   !> Products of all harmonics by real matrices that do not depend on the frequency.
    type :: real_products
       integer :: n_coefficients = 0
       !> Leading blocks of K, M, C up to the last that is not zero: without mass and damping, K.

@@ -13,6 +13,7 @@ module fw_relative
 
    public :: relative_type, new_relative
 
+   !> Relative displacements of pairs and springs, as rows of a model.
    type :: relative_type
       integer :: n_dof = 0
       !> Rows given, and independent coordinates among them.

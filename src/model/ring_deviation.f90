@@ -14,6 +14,7 @@ module fw_ring_deviation
 
    public :: ring_deviation, new_ring_deviation
 
+   !> Deviations of all sectors of a disk from the tuned one.
    type :: ring_deviation
       integer :: n_rows = 0, n_sectors = 0
       !> Rows as combinations: entries of row a are first(a) to first(a + 1) - 1, each a slot, the

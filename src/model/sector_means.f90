@@ -20,6 +20,7 @@ module fw_sector_means
    !> coordinate is to motion above the harmonics as well.
    integer, parameter :: means_none = 0, means_static = 1, means_split = 2
 
+   !> Means over the sectors, where one number stands for all of them.
    type :: sector_means
       !> Mean of the static stiffness of a coordinate of a sector (n_coordinates) [force/length].
       real(wp), allocatable, private :: static(:)

@@ -21,6 +21,7 @@ module fw_split_product
    !> Columns that are copied together: a line of memory of each is read once.
    integer, parameter :: columns_at_hand = 16
 
+   !> A product by a matrix that is split into a static part and one of low rank.
    type :: split_product
       !> S_n (rank, rank, n_retained).
       complex(wp), allocatable :: dynamic(:, :, :)
