@@ -27,8 +27,9 @@ module fw_user_path
    !> Change over a turn, relative to the largest state, that is none; and the one that is taken
    !> where round-off lets it fall no further.
    real(wp), parameter :: repeated = 1.0e-12_wp, nearly_repeated = 1.0e-9_wp
-   !> Singular values of I - M below it are those of states that stay as they are.
-   real(wp), parameter :: singular = 1.0e-9_wp
+   !> Singular values of I - M below it are those of states that stay as they are: of slopes that are
+   !> given, and of differences, whose round-off adds up over a turn.
+   real(wp), parameter :: singular = 1.0e-9_wp, nearly_singular = 1.0e-7_wp
    !> Step of differences that stand for slopes, over the size of the input.
    real(wp), parameter :: relative_step = 1.0e-5_wp
 
@@ -137,7 +138,8 @@ contains
          done = apart <= repeated .or. (turn > plain_turns .and. apart <= nearly_repeated .and. &
                                         apart >= 0.5_wp*last)
          if (done .and. .not. differentiates) return
-         if (wants) call invert(n, m, motion%n_time, state, slope, room)
+         if (wants) call invert(n, m, motion%n_time, state, slope, &
+                                merge(singular, nearly_singular, element%has_derivative), room)
          if (differentiates) then
             carried = by_motion
             do k = 1, motion%n_time
@@ -294,26 +296,29 @@ contains
       !> As of `ask_step`.
       real(wp), intent(inout), contiguous :: slope(:, :)
       integer, intent(out) :: status
-      real(wp) :: shift
+      real(wp) :: shift, lower, upper
       integer :: j
 
       do j = 1, size(room%scale)
          shift = relative*room%scale(j)
-         call at(shift)
+         call at(shift, upper)
          call element%ask_step(omega, room%tau, room%u_at, room%v_at, .false., room%state_at, &
                                room%ahead, room%none, status, room%answer)
          if (status /= 0) return
-         call at(-shift)
+         call at(-shift, lower)
          call element%ask_step(omega, room%tau, room%u_at, room%v_at, .false., room%state_at, &
                                room%behind, room%none, status, room%answer)
          if (status /= 0) return
-         slope(j, :) = 0.5_wp*(room%ahead - room%behind)/shift
+         ! By what the number has moved in this precision: a state that stays has a slope of 1.
+         slope(j, :) = (room%ahead - room%behind)/(upper - lower)
       end do
 
    contains
 
-      subroutine at(by)
+      subroutine at(by, value)
          real(wp), intent(in) :: by
+         !> Of the number that is moved.
+         real(wp), intent(out) :: value
          integer :: i, m
 
          m = size(room%u, 1)
@@ -322,19 +327,28 @@ contains
          room%v_at = room%v
          i = j - size(state)
          if (i <= 0) then
-            room%state_at(j) = room%state_at(j) + by
+            call move(room%state_at(j), by, value)
          else if (i <= m) then
-            room%u_at(i, 1) = room%u_at(i, 1) + by
+            call move(room%u_at(i, 1), by, value)
          else if (i <= 2*m) then
-            room%v_at(i - m, 1) = room%v_at(i - m, 1) + by
+            call move(room%v_at(i - m, 1), by, value)
          else if (i <= 3*m) then
-            room%u_at(i - 2*m, 2) = room%u_at(i - 2*m, 2) + by
+            call move(room%u_at(i - 2*m, 2), by, value)
          else
-            room%v_at(i - 3*m, 2) = room%v_at(i - 3*m, 2) + by
+            call move(room%v_at(i - 3*m, 2), by, value)
          end if
       end subroutine at
 
    end subroutine step_slopes
+
+   pure subroutine move(number, by, value)
+      real(wp), intent(inout) :: number
+      real(wp), intent(in) :: by
+      real(wp), intent(out) :: value
+
+      number = number + by
+      value = number
+   end subroutine move
 
    !> Derivatives of the state by coefficients through step k (0: the strain).
    pure subroutine carry(path, omega, n, m, k, slope, by_motion, next)
@@ -411,10 +425,12 @@ contains
 
    !> Inverse of I - M, of a turn, on what does not stay as it is: by its singular values, which
    !> rotations of its columns give (Hestenes).
-   subroutine invert(n, m, n_time, state, slope, room)
+   subroutine invert(n, m, n_time, state, slope, least, room)
       integer, intent(in) :: n, m, n_time
       real(wp), intent(in) :: state(n, 0:n_time)
       real(wp), intent(in) :: slope(n + 4*m, n + m, 0:n_time)
+      !> Singular values that are none.
+      real(wp), intent(in) :: least
       type(step_room), intent(inout) :: room
       real(wp) :: length
       integer :: i, j, k
@@ -445,7 +461,7 @@ contains
          room%inverse = 0.0_wp
          do i = 1, n
             length = norm2(left(:, i))
-            if (length <= singular) cycle
+            if (length <= least) cycle
             do k = 1, n
                room%inverse(:, k) = room%inverse(:, k) + &
                                     scale*right(:, i)*left(k, i)/(length**2*scale(k))

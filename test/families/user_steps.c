@@ -45,15 +45,19 @@ static double rate(const double *p, int forward, double z, double *slope)
    return 1.0 - shape * power * size;
 }
 
-/* The classical method, four steps for each instant; slopes by z and by the step go along. */
+/* The classical method, four steps for each instant, and more where it moves far: the first step
+   strains the element from its assembly to the motion at once. Slopes by z and by the step go
+   along. */
 int bouc_wen(void *user, const fw_law_call *call, const double *state, double *after, double *force,
              double *dstate, double *dforce)
 {
    const double *p = call->parameters;
-   const double h = p[0] / p[1] * (call->u[1] - call->u[0]) / 4.0;
+   const double far = p[0] / p[1] * (call->u[1] - call->u[0]);
+   const int steps = 4 + (int)fmin(4.0 * fabs(far), 1e6);
+   const double h = far / steps;
    double z = state[0], by_z = 1.0, by_h = 0.0;
    UNUSED;
-   for (int i = 0; i < 4; i++) {
+   for (int i = 0; i < steps; i++) {
       static const double part[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
       double k = 0.0, k_z = 0.0, k_h = 0.0, sum = 0.0, sum_z = 0.0, sum_h = 0.0, slope;
       for (int j = 0; j < 4; j++) {
@@ -75,7 +79,7 @@ int bouc_wen(void *user, const fw_law_call *call, const double *state, double *a
    if (!call->wants_derivative)
       return 0;
    dstate[0] = by_z;
-   dstate[3] = by_h * p[0] / p[1] / 4.0;
+   dstate[3] = by_h * p[0] / p[1] / steps;
    dstate[1] = -dstate[3];
    dforce[0] = p[1];
    return 0;

@@ -15,9 +15,12 @@ LEAST_CASES = 19
 
 
 def races(setting):
-    """Twelve handles at the same time, and eight with laws, under the thread sanitizer."""
+    """Twelve handles at the same time, and eight with laws, under the thread sanitizer.
+
+    Without optimisation: accesses are the same, and a build takes half as long.
+    """
     directory, _ = build(setting, "races", "-DFRETWEAR_SANITIZE=thread",
-                         "-DCMAKE_Fortran_FLAGS=-O1 -g", "-DFRETWEAR_PYTHON=OFF",
+                         "-DCMAKE_Fortran_FLAGS=-O0 -g", "-DFRETWEAR_PYTHON=OFF",
                          "-DFRETWEAR_SHARED=OFF", "-DFRETWEAR_TESTS=OFF")
     return judge(directory, thread_sanitizer)
 
