@@ -76,6 +76,8 @@ def drawn(seed):
                       "weakening": random.uniform(0.2, 1.0), "exponent": random.uniform(1.0, 2.0),
                       "viscous": random.uniform(0.0, 0.2) if fast else 0.0,
                       "speed": random.normal() * 0.3 if random.random() < 0.3 else 0.0}
+        if law != "regularised":
+            pairs[-1]["speed"] = 0.0  # Elastic and rigid pairs slide along too: family rubs.
         curved = normal and law in ("penalty", "regularised") and random.random() < 0.5
         pairs[-1] |= {
             "word": str(random.choice(normal_laws.WORDS)) if curved else "unilateral",
