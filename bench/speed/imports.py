@@ -226,7 +226,7 @@ CHOICES = (("superlu", 1e8, 64, "superlu, each solution twice"),
            ("cholmod", 1e8, 64, "cholmod, blocks of 64"),
            ("cholmod", 1e8, 128, "cholmod, blocks of 128"),
            ("mumps", 1e8, 64, "mumps"))
-CHOSEN_ON = "sector-384"
+CHOSEN_ON = "sector-48"
 
 
 def reduce_otherwise(folder: Path, engine: str, kept: float, width: int) -> dict[str, float]:
