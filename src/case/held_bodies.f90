@@ -25,6 +25,8 @@ module fw_held_bodies
       logical, allocatable :: touches(:)
       !> Whether forces exist that balance its load, and whether forces exist without one.
       logical :: can_stand = .true., locks_itself = .false.
+      !> Whether it has a load at rest at all.
+      logical :: is_loaded = .true.
       !> Motions, and those that normals hold.
       integer :: n_motions = 0, n_by_normals = 0
    end type body_hold
@@ -125,6 +127,7 @@ contains
       call list_forces(case, motion, hold%touches, cone, normals, n_press)
       hold%n_by_normals = rank_of(normals)
       load = matmul(static_load(case), motion)
+      hold%is_loaded = any(abs(load) > 0.0_wp) .or. allocated(case%model%cyclic%speed)
       ! A speed that follows the frequency, and so the load.
       if (allocated(case%model%cyclic%speed)) load = 0.0_wp
       call nearest_in_cone(cone, load, left)

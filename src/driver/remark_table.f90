@@ -36,6 +36,9 @@ module fw_remark_table
       remark_kind('self-locking', &
                   'friction can jam a body that no spring holds: normal forces at rest '// &
                   'have no upper bound, as of flanks with tan a <= mu'), &
+      remark_kind('body without load', &
+                  'nothing presses a body that no spring holds against its flanks: no '// &
+                  'rotation speed, radius or static load'), &
       remark_kind('body turns', &
                   'normals leave a body that no spring holds a motion, which friction alone '// &
                   'holds: a cylinder, or one point on each flank'), &

@@ -113,7 +113,7 @@ contains
       call remark_bodies(case, remarks)
    end subroutine remark_input
 
-   !> Bodies that forces without a load can hold, or that normals leave a motion.
+   !> Bodies that forces without a load can hold, that have none, or that normals leave a motion.
    subroutine remark_bodies(case, remarks)
       type(case_type), intent(in) :: case
       type(remark_list), intent(inout) :: remarks
@@ -129,6 +129,9 @@ contains
             if (hold%locks_itself) call remarks%add('self-locking', 'body '//name//' can be '// &
                'jammed: friction holds forces of its pairs without a load, and its normal '// &
                'forces at rest have no upper bound')
+            if (.not. hold%is_loaded) call remarks%add('body without load', 'nothing presses '// &
+               'body '//name//' against its flanks: give model%rotation_speed, and a radius '// &
+               'and a direction in /body')
             if (hold%n_by_normals == hold%n_motions) cycle
             allocate (numbers(0))
             do k = 1, size(hold%touches)

@@ -40,6 +40,10 @@ contains
          call read_group(reader, nothing%slot(k)%group, folder, elements%slot(k)%group, error)
          if (allocated(error)) return
       end do
+      ! Without their number the constants would be left out, and the function would find none.
+      if (reader%given('user', 'parameters') .and. .not. reader%given('user', 'n_parameters')) &
+         call reader%refuse('user', 'n_parameters', 'is missing: must be how many constants '// &
+                            'each function gets')
       if (.not. present(laws)) return
       if (.not. reader%failed()) call check_dofs(laws, reader%extents('(n_dof+n_rows)'), error)
       if (.not. (allocated(error) .or. reader%failed())) call elements%add_laws(laws)

@@ -190,19 +190,20 @@ def test_what_cannot_stand_is_refused(tmp_path):
     assert "cannot hold" not in message
 
 
-def remarks_of(model, folder):
+def remarks_of(model, folder, **more):
     model.to_hdf5(folder / "model.h5")
-    run(folder, with_model(at(120.0)), status=(0, 4))
+    run(folder, with_model(at(120.0, **more)), status=(0, 4))
     with h5py.File(folder / "case.h5") as file:
         return [] if "remarks" not in file else [name.decode() for name in file["remarks/name"][()]]
 
 
 def test_remarks(tmp_path):
-    """tan a <= mu jams; normals through one point leave a rotation."""
-    def names(model):
-        return set(remarks_of(model, tmp_path))
+    """tan a <= mu jams; normals through one point leave a rotation; at rest nothing presses."""
+    def names(model, **more):
+        return set(remarks_of(model, tmp_path, **more))
+    assert "body without load" in names(wedge(), speed=0.0)
     assert "self-locking" in names(wedge(angle=20.0, mu=0.5))
-    assert not {"self-locking", "body turns"} & names(wedge())
+    assert not {"self-locking", "body turns", "body without load"} & names(wedge())
     single = {"left": fw.Flank([[1, 2]], [[-0.01, 0.0]]),
               "right": fw.Flank([[3, 4]], [[0.01, 0.0]])}
     assert "body turns" in names(wedge(**single))

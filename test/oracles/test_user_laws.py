@@ -262,6 +262,7 @@ def test_a_dashpot_is_damping(tmp_path, library):
     ({"side_2": [1]}, 3, "must differ"),
     ({"side_1": [3]}, 3, "side_1"),
     ({"n_parameters": 0, "parameters": None, "n_elements": None}, 3, "n_elements is missing"),
+    ({"n_parameters": None}, 3, "n_parameters is missing"),
 ])
 def test_wrong_input_ends_in_words(tmp_path, library, changes, status, told):
     keys = user(library, "spring", [1], [0.5, 0.0]) | changes
