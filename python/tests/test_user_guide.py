@@ -28,12 +28,12 @@ def read_keys() -> set[str]:
 def test_no_key_is_read_that_is_not_listed() -> None:
     """Names in the sources stand in the call that declares the key."""
     declared = {key for path in (ROOT / "src").rglob("*.f90") for key in re.findall(
-        r"\b(?:load_)?key\('(\w+)'", path.read_text())}
+        r"\b(?:load_|slider_)?key\('(\w+)'", path.read_text())}
     assert declared == {name.split("%")[1] for name in read_keys()}
 
 
 #: Letters of the texts of a key (src/base/key.f90), beyond which they are cut without a word.
-ROOM = {"help": 160, "shape": 20, "absent": 60, "only": 60, "unit": 20}
+ROOM = {"help": 160, "shape": 20, "absent": 60, "only": 100, "unit": 20}
 #: Letters of the name of an extent (src/io/reader.f90).
 EXTENT = 12
 

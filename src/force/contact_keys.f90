@@ -237,17 +237,17 @@ contains
                      contact%penalty_scale)
       call keys%bind_word(key('memory', 'where pairs that never slip start: unstrained, or as '// &
                               'the last point ended'), contact%memory, memory_words)
-      call keys%bind(slider('slider_1', 'displacement along t1 where an assembled pair is '// &
+      call keys%bind(slider_key('slider_1', 'displacement along t1 where an assembled pair is '// &
                             'unstrained; of those that never slip'), contact%slider_1)
-      call keys%bind(slider('slider_2', 'the same along t2'), contact%slider_2)
+      call keys%bind(slider_key('slider_2', 'the same along t2'), contact%slider_2)
 
    contains
 
-      pure type(key_type) function slider(name, help)
+      pure type(key_type) function slider_key(name, help)
          character(*), intent(in) :: name, help
 
-         slider = key(name, help, unit='L', shape='n_pairs', absent='of the file, else 0')
-      end function slider
+         slider_key = key(name, help, unit='L', shape='n_pairs', absent='of the file, else 0')
+      end function slider_key
 
    end subroutine bind_march
 

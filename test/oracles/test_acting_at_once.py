@@ -33,7 +33,11 @@ def test_smooth_friction_in_time(tmp_path, name):
     found = run_case(tmp_path, in_time(test_sliding_friction.groups(case["params"], 7)))
     wanted = coefficients_of(case["u1"], 7)[:15]
     assert difference(found.coefficients[0][:15, 0], wanted) < ERROR
-    assert abs(found.dissipation[0, 0] / case["work_per_cycle"][0] - 1.0) < 10.0 * ERROR
+    # The reference has what friction takes from the structure.
+    taken = found.dissipation[0, 0]
+    if found.obstacle_work is not None:
+        taken -= found.obstacle_work[0, 0]
+    assert abs(taken / case["work_per_cycle"][0] - 1.0) < 10.0 * ERROR
 
 
 @pytest.mark.parametrize("law", ["penalty", "regularised"])
