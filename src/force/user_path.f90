@@ -27,8 +27,8 @@ module fw_user_path
    !> Change over a turn, relative to the largest state, that is none; and the one that is taken
    !> where round-off lets it fall no further.
    real(wp), parameter :: repeated = 1.0e-12_wp, nearly_repeated = 1.0e-9_wp
-   !> Singular values of I - M below it are those of states that stay as they are: of slopes that are
-   !> given, and of differences, whose round-off adds up over a turn.
+   !> Singular values of I - M below it are those of states that stay as they are: of slopes that
+   !> are given, and of differences, whose round-off adds up over a turn.
    real(wp), parameter :: singular = 1.0e-9_wp, nearly_singular = 1.0e-7_wp
    !> Step of differences that stand for slopes, over the size of the input.
    real(wp), parameter :: relative_step = 1.0e-5_wp

@@ -41,9 +41,10 @@ contains
          if (allocated(error)) return
       end do
       ! Without their number the constants would be left out, and the function would find none.
-      if (reader%given('user', 'parameters') .and. .not. reader%given('user', 'n_parameters')) &
+      if (reader%given('user', 'parameters') .and. .not. reader%given('user', 'n_parameters')) then
          call reader%refuse('user', 'n_parameters', 'is missing: must be how many constants '// &
                             'each function gets')
+      end if
       if (.not. present(laws)) return
       if (.not. reader%failed()) call check_dofs(laws, reader%extents('(n_dof+n_rows)'), error)
       if (.not. (allocated(error) .or. reader%failed())) call elements%add_laws(laws)
