@@ -37,6 +37,17 @@ def disk(pairs: bool = False) -> fw.Case:
                    harmonics={"n_harmonics": 1, "n_time": 32}, **groups)
 
 
+def files_of_disk(folder: Path) -> Path:
+    """The same as a namelist beside its model file."""
+    model = disk().model
+    assert model is not None
+    model.save(folder / "model.h5")
+    (folder / "case.nml").write_text(
+        "&model source = 'hdf5' file = 'model.h5' /\n&cyclic engine_order = 2 mistuned = .true. /\n"
+        "&sweep start = 0.6 end = 1.6 n_points = 21 /\n&harmonics n_harmonics = 1 /\n")
+    return folder / "case.nml"
+
+
 def same(a: fw.Population, b: fw.Population) -> bool:
     return all(np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
                for name in ("amplitude", "omega", "sector", "amplification", "tuned", "converged",
@@ -146,13 +157,7 @@ def test_wrong_arguments_are_refused(more: dict[str, object], told: str) -> None
 
 
 def test_command_and_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    case = disk()
-    assert case.model is not None
-    case.model.save(tmp_path / "model.h5")
-    (tmp_path / "case.nml").write_text(
-        "&model source = 'hdf5' file = 'model.h5' /\n&cyclic engine_order = 2 mistuned = .true. /\n"
-        "&sweep start = 0.6 end = 1.6 n_points = 21 /\n&harmonics n_harmonics = 1 /\n")
-    words = ["population", str(tmp_path / "case.nml"), "--patterns", "30", "--seed", "3"]
+    words = ["population", str(files_of_disk(tmp_path)), "--patterns", "30", "--seed", "3"]
     assert main([*words, "-q"]) == 0
     told = capsys.readouterr().out
     assert "30 disks" in told and "tip" in told

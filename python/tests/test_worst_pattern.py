@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_populations import N, disk
+from test_populations import N, disk, files_of_disk
 
 import fretwear as fw
 from fretwear.cli import main
@@ -52,13 +52,7 @@ def test_wrong_arguments_are_refused(more: dict[str, object], told: str) -> None
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    case = disk()
-    assert case.model is not None
-    case.model.save(tmp_path / "model.h5")
-    (tmp_path / "case.nml").write_text(
-        "&model source = 'hdf5' file = 'model.h5' /\n&cyclic engine_order = 2 mistuned = .true. /\n"
-        "&sweep start = 0.6 end = 1.6 n_points = 21 /\n&harmonics n_harmonics = 1 /\n")
-    words = ["population", str(tmp_path / "case.nml"), "--worst", "--starts", "2", "-q"]
+    words = ["population", str(files_of_disk(tmp_path)), "--worst", "--starts", "2", "-q"]
     assert main([*words, "--box", "0.03"]) == 0
     told = capsys.readouterr().out
     assert "a local maximum" in told and "&mistuning frequency = " in told

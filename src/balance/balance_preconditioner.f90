@@ -81,24 +81,13 @@ contains
          self%preconditioner%is_whole = .true.
       else
          is_stronger = .not. self%preconditioner%tells_sectors .and. &
-                       .not. takes_balance(self%problem)
+                       .not. self%problem%forces%takes_balance()
          if (.not. is_stronger) return
          self%preconditioner%tells_sectors = .true.
       end if
       ! What was built does not serve any more.
       self%preconditioner%n = 0
    end procedure take_whole
-
-   !> Whether a law takes the balance: what its pairs do then reaches all sectors.
-   pure logical function takes_balance(problem)
-      type(balance_problem), intent(in) :: problem
-      integer :: k
-
-      takes_balance = .false.
-      do k = 1, problem%forces%n_laws
-         takes_balance = takes_balance .or. problem%forces%entry(k)%law%prediction%takes_balance
-      end do
-   end function takes_balance
 
    !> Factors of one harmonic, but for the one that an augmented system builds with its borders.
    subroutine build_harmonic(self, h)

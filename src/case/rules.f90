@@ -199,7 +199,8 @@ module fw_rules
                 'a mode is a motion without excitation: leave them out'), &
       rule_type("case%analysis = 'mode'", sliding_side, &
                 'a mode is a motion without excitation: leave the speeds out'), &
-      rule_type('sweep%stability = .true.', sliding_side, 'leave stability out')]
+      rule_type('sweep%stability = .true.', sliding_side, 'leave stability out'), &
+      rule_type("contact%memory = 'carried'", sliding_side, "use 'assembly'")]
 
    !> Loads of supports are those of stiffness, damping and mass.
    type(rule_type), parameter :: of_base(*) = [ &

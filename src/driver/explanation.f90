@@ -9,6 +9,7 @@ module fw_explanation
    use fw_sinks, only: point_sink
    use fw_strategy, only: point_strategy
    use fw_text, only: to_text
+   use fw_vibration, only: six_digits
    implicit none (type, external)
    private
 
@@ -94,7 +95,7 @@ contains
       character(:), allocatable, intent(out) :: text
 
       associate (failure => self%item(place))
-         text = 'no solution at '//trim(shown(failure%omega))//' rad/s'
+         text = 'no solution at '//trim(six_digits(failure%omega))//' rad/s'
          if (failure%n_points == 2) text = text//' and at the point behind it'
          if (failure%n_points > 2) text = text//' and at '//to_text(failure%n_points - 1)// &
                                           ' points behind it'
@@ -177,16 +178,7 @@ contains
 
       words = ''
       if (.not. allocated(point%amplitude)) return
-      if (size(point%amplitude) > 0) words = ' (amplitude '//trim(shown(point%amplitude(1)))//')'
+      if (size(point%amplitude) > 0) words = ' (amplitude '//trim(six_digits(point%amplitude(1)))//')'
    end function amplitude_of
-
-   !> A number to read.
-   function shown(number) result(words)
-      real(wp), intent(in) :: number
-      character(24) :: words
-
-      write (words, '(es12.5)') number
-      words = adjustl(words)
-   end function shown
 
 end module fw_explanation

@@ -80,7 +80,7 @@ contains
          ! Waves of other nodal diameters that harmonics may meet stay as coordinates.
          self%case%sweep%start = modes%frequency()
          call at_rest(self, x, modes, error)
-      else if (any_rigid(self%problem)) then
+      else if (self%problem%forces%takes_balance()) then
          ! Their numbers of the method are those of the structure near the frequency of the mode.
          self%case%sweep%start = modes%frequency()
          call scale_anew(self, x, modes, error)
@@ -153,16 +153,6 @@ contains
 
       is_wave = case%model%cyclic%is_cyclic .and. .not. case%model%cyclic%is_mistuned
    end function is_wave
-
-   pure logical function any_rigid(problem)
-      type(balance_problem), intent(in) :: problem
-      integer :: k
-
-      any_rigid = .false.
-      do k = 1, problem%forces%n_laws
-         any_rigid = any_rigid .or. problem%forces%entry(k)%law%prediction%takes_balance
-      end do
-   end function any_rigid
 
    !> The problem, and its modes about the position at rest x.
    subroutine at_rest(self, x, modes, error)

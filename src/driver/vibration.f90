@@ -13,7 +13,7 @@ module fw_vibration
    implicit none (type, external)
    private
 
-   public :: ends, looks_again, vibration, walk_options, walk_type, way_type
+   public :: ends, looks_again, six_digits, vibration, walk_options, walk_type, way_type
    public :: way_guesses_by_lu, way_last_guess, way_own, way_rise, way_steps
 
    !> Kinds of ways behind the guesses. Of every vibration: the guesses with LU where GMRES failed;
@@ -227,7 +227,7 @@ contains
       if (self%known%kept > 0) words = 'tried were the last solutions, every pair stuck'
       words = trim(words)//self%tried
       if (self%best_residual < huge(1.0_wp)) then
-         words = trim(words)//'; the best ended at a residual of '//shown(self%best_residual)
+         words = trim(words)//'; the best ended at a residual of '//six_digits(self%best_residual)
       end if
       if (self%found_ripple .or. self%ripples) then
          words = trim(words)//'; what solved the equations had friction that is ripple'
@@ -235,7 +235,7 @@ contains
       if (self%out_of_work) words = trim(words)//'; the iterations that a point is worth were spent'
       if (self%known%kept == 0) return
       if (abs(self%known%place(1) - self%wanted%along) > 0.0_wp) then
-         words = trim(words)//'; the last solution is at '//shown(self%known%place(1))
+         words = trim(words)//'; the last solution is at '//six_digits(self%known%place(1))
          if (turns(self%known)) words = trim(words)//', where the curve grows steeper, as '// &
                                         'before a fold: continuation = ''arclength'' follows one'
       end if
@@ -260,14 +260,14 @@ contains
       turns = slope(1) > steeper*slope(2)
    end function turns
 
-   !> A number to read, of six digits.
-   function shown(number) result(words)
+   !> A number to read.
+   function six_digits(number) result(words)
       real(wp), intent(in) :: number
       character(24) :: words
 
       write (words, '(es12.5)') number
       words = adjustl(words)
-   end function shown
+   end function six_digits
 
    !> Whether a way of its table can be gone now.
    logical function offers(self, way)

@@ -36,6 +36,7 @@ module fw_force_list
       procedure :: add
       procedure :: reserve
       procedure :: least_instants
+      procedure :: takes_balance
    end type force_list
 
 contains
@@ -110,5 +111,16 @@ contains
          end associate
       end do
    end function least_instants
+
+   !> Whether a law takes the balance: what its pairs do depends on the forces of all others then.
+   pure logical function takes_balance(self)
+      class(force_list), intent(in) :: self
+      integer :: k
+
+      takes_balance = .false.
+      do k = 1, self%n_laws
+         takes_balance = takes_balance .or. self%entry(k)%law%prediction%takes_balance
+      end do
+   end function takes_balance
 
 end module fw_force_list

@@ -5,11 +5,10 @@
 !> n being a harmonic of the response, or an order over the greatest common divisor of all orders.
 module fw_gap_terms
    use fw_contact_data, only: contact_type
-   use fw_divisor, only: common_divisor
    use fw_key, only: key, key_visitor
    use fw_key_range, only: from_to
    use fw_kinds, only: wp
-   use fw_load_terms, only: turned
+   use fw_load_terms, only: harmonics_from_orders, turned
    implicit none (type, external)
    private
 
@@ -64,17 +63,8 @@ contains
    !> Harmonics from orders, or 1 where neither is given.
    pure subroutine take_orders(self)
       class(gap_terms), intent(inout) :: self
-      integer :: i
 
-      self%fundamental = 0
-      if (allocated(self%order)) then
-         do i = 1, size(self%order)
-            self%fundamental = common_divisor(self%fundamental, self%order(i))
-         end do
-         self%harmonic = self%order/max(self%fundamental, 1)
-      else if (.not. allocated(self%harmonic)) then
-         allocate (self%harmonic(self%n_terms), source=1)
-      end if
+      call harmonics_from_orders(self%n_terms, self%order, self%harmonic, self%fundamental)
    end subroutine take_orders
 
    !> Add the terms to the gaps of pairs that have a normal dof.

@@ -14,7 +14,7 @@ module fw_load_terms
    implicit none (type, external)
    private
 
-   public :: load_terms, add_wave, turned
+   public :: load_terms, add_wave, harmonics_from_orders, turned
 
    !> More terms, a higher harmonic or a higher power are taken for a mistake.
    integer, parameter :: most_terms = 1000000, most_harmonic = 100000, most_power = 9
@@ -71,18 +71,30 @@ contains
    !> Harmonics from orders, or 1 where neither is given.
    pure subroutine take_orders(self)
       class(load_terms), intent(inout) :: self
+
+      call harmonics_from_orders(self%n_terms, self%order, self%harmonic, self%fundamental)
+   end subroutine take_orders
+
+   !> Harmonics of terms: orders over their greatest common divisor; 1 where neither is given.
+   pure subroutine harmonics_from_orders(n_terms, order, harmonic, fundamental)
+      integer, intent(in) :: n_terms
+      !> (n_terms); not allocated where harmonics are given, or nothing.
+      integer, allocatable, intent(in) :: order(:)
+      integer, allocatable, intent(inout) :: harmonic(:)
+      !> The divisor; 0 where there are no orders.
+      integer, intent(out) :: fundamental
       integer :: i
 
-      self%fundamental = 0
-      if (allocated(self%order)) then
-         do i = 1, size(self%order)
-            self%fundamental = common_divisor(self%fundamental, self%order(i))
+      fundamental = 0
+      if (allocated(order)) then
+         do i = 1, size(order)
+            fundamental = common_divisor(fundamental, order(i))
          end do
-         self%harmonic = self%order/max(self%fundamental, 1)
-      else if (.not. allocated(self%harmonic)) then
-         allocate (self%harmonic(self%n_terms), source=1)
+         harmonic = order/max(fundamental, 1)
+      else if (.not. allocated(harmonic)) then
+         allocate (harmonic(n_terms), source=1)
       end if
-   end subroutine take_orders
+   end subroutine harmonics_from_orders
 
    !> Add the terms to the static load and to the waves.
    pure subroutine add_to(self, static, waves, columns, rows)
