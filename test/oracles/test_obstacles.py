@@ -6,6 +6,7 @@ elastic friction on the path, steady sliding in two directions, smooth and rigid
 import copy
 import json
 
+import h5py
 import numpy as np
 import pytest
 from cases import merged, run
@@ -207,6 +208,39 @@ def test_events_agree_with_many_instants(tmp_path):
                     run_case(tmp_path, fine).coefficients) < 1e-5
 
 
+# Central differences of solutions to 1e-13 with a step of 1e-5: 1e-8 at worst, with a margin of ten.
+@pytest.mark.parametrize("sliding", [{}, {"speed_1": 0.7}, {"speed_1": 3.0, "sliding": "steady"}])
+@pytest.mark.parametrize("law", [
+    {"law": "penalty", "tangential_stiffness": 1.5, "normal_stiffness": 2.0},
+    {"law": "regularised", "slip_speed": 0.2, "normal_stiffness": 2.0}])
+def test_derivatives_are_those_of_differences(tmp_path, law, sliding):
+    case = {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": 2, "mass": np.diag([1.0, 1.3]), "damping": np.diag([0.1, 0.12]),
+                  "stiffness": np.array([[4.0, -1.0], [-1.0, 5.0]])},
+        "contact": {"n_pairs": 1, "side_1": [1, 0, 2], "mu": 0.3, "gap": 0.1, "n_gap_terms": 2,
+                    "gap_harmonic": [1, 2], "gap_amplitude": [0.15, 0.05],
+                    "gap_phase": [30.0, -20.0], **law, **sliding},
+        "load": {"cosine": [1.0, 0.6], "static": [0.0, -0.8]},
+        "harmonics": {"n_harmonics": 9, "n_time": 1024, "sampling": "uniform"},
+        "sweep": {"start": 1.9}, "solver": {"tolerance": 1e-13}}
+    quantities = ["first_harmonic", "dissipation"]
+    told = merged(case, {"sensitivity": {"parameters": ["contact%mu", "contact%gap"],
+                                         "quantities": quantities}})
+    run(tmp_path, told)
+    with h5py.File(tmp_path / "case.h5") as file:
+        slopes = {(q, key): file[f"sensitivity/{q}/contact_{key}"][()].ravel()
+                  for q in quantities for key in ("mu", "gap")}
+    step = 1e-5
+    for key in ("mu", "gap"):
+        ends = [run_case(tmp_path, at(case, 1.9, **{key: case["contact"][key] + by}))
+                for by in (-step, step)]
+        first = [np.hypot(*end.coefficients[0][1:3]) for end in ends]
+        assert distance(slopes["first_harmonic", key], (first[1] - first[0]) / (2 * step)) < 1e-7
+        heat = [end.dissipation.sum() for end in ends]
+        assert distance(slopes["dissipation", key], (heat[1] - heat[0]) / (2 * step)) < 1e-7
+
+
 # Another program part, which shares the pairs alone: 7e-6 with H = 25.
 def test_integration_in_time_agrees(tmp_path):
     groups = oracle("v4_rub_path")["groups"]
@@ -256,6 +290,7 @@ def bad(**contact):
     (bad(sliding="steady", speed_1=None), "give speed_1 or speed_2"),
     (bad(law="rigid", tangential_stiffness=None, normal_stiffness=None), "'steady'"),
     (bad(sliding="along"), "sliding"),
+    (bad(memory="carried"), "contact%memory = 'carried' does not go with"),
     ({"case": {"analysis": "mode"}, "mode": {"start": 1e-4, "end": 1e-3},
       "sweep": {"start": None}}, "a mode is a motion without excitation"),
     ({"sweep": {"stability": True}}, "sweep%stability = .true. does not go with"),
