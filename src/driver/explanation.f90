@@ -178,7 +178,8 @@ contains
 
       words = ''
       if (.not. allocated(point%amplitude)) return
-      if (size(point%amplitude) > 0) words = ' (amplitude '//trim(six_digits(point%amplitude(1)))//')'
+      if (size(point%amplitude) == 0) return
+      words = ' (amplitude '//trim(six_digits(point%amplitude(1)))//')'
    end function amplitude_of
 
 end module fw_explanation
