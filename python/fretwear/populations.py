@@ -154,6 +154,9 @@ def population(case: Case | str | Path, patterns: int | ArrayLike = 100, *, seed
 
     def solve(numbers: NDArray[np.int64], stopped: threading.Event) -> tuple[
             NDArray[np.int64], Result | None]:
+        # Asked here too: the pool looks at it only now and then.
+        if ended.is_set():
+            return numbers, None
         groups: Any = {"population": {"patterns": drawn[numbers].ravel().tolist(),
                                       "n_patterns": len(numbers)},
                        "case": {"threads": 1}}

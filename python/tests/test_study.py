@@ -201,7 +201,7 @@ quantities = ["n_converged"]
 def test_interrupted_and_taken_up_again(study: Study, program: str) -> None:
     """Ctrl-C ends the runs at work, keeps what is complete, and leaves no process behind."""
     study.write(LONG)
-    text = study.path.read_text().replace("n_points\" = 11", "n_points\" = 4001")
+    text = study.path.read_text().replace("n_points\" = 11", "n_points\" = 16001")
     text = text.replace(f'program = "{PROGRAM}"\n', program)
     study.path.write_text(text)
     process = subprocess.Popen(
@@ -227,7 +227,7 @@ def test_interrupted_and_taken_up_again(study: Study, program: str) -> None:
     again = study.results()
     assert len(again) == 8
     assert {name: again[name] for name in kept} == kept
-    assert study.table()["n_converged"].tolist() == [4001] * 8
+    assert study.table()["n_converged"].tolist() == [16001] * 8
 
 
 def test_a_run_that_was_killed_is_repeated(study: Study) -> None:

@@ -1,12 +1,11 @@
 """Missions: blocks of cycles in other conditions wear a joint in turn, flight after flight."""
 import json
 import signal
-import subprocess
 
 import h5py
 import numpy as np
 import pytest
-from cases import merged, read, run, write_namelist
+from cases import merged, read, run, signal_at, write_namelist
 from project import PROGRAM, ROOT
 from scipy.integrate import solve_ivp
 from wear_cases import CLOCK, joint, oscillator, result, shared_load
@@ -328,13 +327,7 @@ def test_killed_within_a_flight(tmp_path):
     groups = mission(SECTOR, BLOCKS, 4)
     whole = result(tmp_path, groups, name="whole")
     write_namelist(tmp_path / "part.nml", groups)
-    with subprocess.Popen([PROGRAM, "part.nml"], cwd=tmp_path, text=True, stderr=subprocess.PIPE,
-                          stdout=subprocess.DEVNULL) as process:
-        for line in process.stderr:
-            if line.startswith("point 6 "):
-                process.send_signal(signal.SIGINT)
-                break
-        process.communicate()
+    signal_at([PROGRAM, "part.nml"], "point 6 ", signal.SIGINT, tmp_path, caught=6)
     part = read(tmp_path / "part.h5")
     assert 6 <= len(part["omega"]) < len(whole["omega"])
     again = result(tmp_path, groups, "--restart", "part.h5", name="again")

@@ -1,13 +1,11 @@
 """A wear run that was interrupted and continued gives the numbers of one that was not."""
-import os
 import shutil
 import signal
-import subprocess
 
 import h5py
 import numpy as np
 import pytest
-from cases import merged, read, run, write_namelist
+from cases import merged, read, run, signal_at, write_namelist
 from project import PROGRAM, ROOT
 from wear_cases import assert_same, oscillator, prescribed_slip, result, shared_load
 
@@ -91,14 +89,8 @@ def test_killed_run(tmp_path):
     groups = oscillator(25, error_tolerance=1e-5, n_cycles=50.0)
     whole = result(tmp_path, groups, name="whole")
     write_namelist(tmp_path / "case.nml", groups)
-    with subprocess.Popen([PROGRAM, "-v", "case.nml"], cwd=tmp_path, stderr=subprocess.PIPE,
-                          stdout=subprocess.DEVNULL, text=True,
-                          env={**os.environ, "OMP_WAIT_POLICY": "passive"}) as process:
-        for line in process.stderr:
-            if line.startswith("point 8"):
-                break
-        process.send_signal(signal.SIGKILL)
-    assert process.returncode == -signal.SIGKILL
+    signal_at([PROGRAM, "-v", "case.nml"], "point 8", signal.SIGKILL, tmp_path,
+              caught=-signal.SIGKILL)
     assert not (tmp_path / "case.h5").exists()
     left = read(tmp_path / "case.h5.part")
     assert left["attributes"]["status"] == "incomplete"

@@ -9,8 +9,8 @@ from project import PATIENT, PROGRAM
 from fretwear._namelist import literal
 from fretwear._namelist import write_namelist as namelist_text
 
-__all__ = ["literal", "merged", "read", "run", "run_reference", "with_model", "write_namelist",
-           "write_parts"]
+__all__ = ["literal", "merged", "read", "run", "run_reference", "signal_at", "with_model",
+           "write_namelist", "write_parts"]
 
 
 def write_namelist(path, groups):
@@ -84,3 +84,24 @@ def read(path):
         found["attributes"] = dict(file.attrs)
         found["wear"] = dict(file["wear"].attrs) if "wear" in file else {}
     return found
+
+
+def signal_at(command, line, number, folder, caught, tries=10):
+    """Send a signal to a run that has told a line; `caught` is the status that it then ends with.
+
+    On a busy machine a run may be complete before the signal comes: then it is run again.
+    """
+    for _ in range(tries):
+        with subprocess.Popen(command, cwd=folder, text=True, stderr=subprocess.PIPE,
+                              stdout=subprocess.DEVNULL, env=PATIENT) as process:
+            for told in process.stderr:
+                if told.startswith(line):
+                    process.send_signal(number)
+                    break
+            process.communicate()
+        if process.returncode != 0:
+            break
+        for path in folder.glob("*.h5*"):
+            if path.name.split(".")[0] == command[-1].split(".")[0]:
+                path.unlink()
+    assert process.returncode == caught
