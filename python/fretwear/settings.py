@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 __all__ = ["UNITS", "Base", "Body", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic",
            "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output",
-           "Polynomial", "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring",
-           "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
+           "Polynomial", "Population", "PseudoTime", "Resonance", "Ringdown", "Sensitivity",
+           "Solver", "Spring", "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -80,6 +80,7 @@ UNITS: dict[str, str] = {
     "mode%end": "L",
     "campbell%start": "rad/s",
     "campbell%end": "rad/s",
+    "ringdown%amplitude": "L",
     "stress%endurance": "F/L^2",
     "stress%ultimate": "F/L^2",
     "control%amplitude": "L",
@@ -92,9 +93,9 @@ class CaseGroup(TypedDict, total=False):
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
     #: a sweep, one frequency, wear, integration in time, natural frequencies, a nonlinear mode, a
-    #: resonance, a Campbell diagram, or many mistuned disks (default: 'frf')
+    #: resonance, a Campbell diagram, many mistuned disks, or free decay (default: 'frf')
     analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
-                      "population"]
+                      "population", "ringdown"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
@@ -800,6 +801,20 @@ class Campbell(TypedDict, total=False):
     n_points: int
 
 
+class Ringdown(TypedDict, total=False):
+    """Group &ringdown: free decay from the shape of a mode."""
+
+    #: of the elastic modes of the structure with its closed pairs stuck (default: 1)
+    number: int
+    #: [L] of the first observed quantity, from where the structure rests; only: analysis =
+    #: 'ringdown' (required)
+    amplitude: float
+    #: periods of the stuck mode that are followed (default: 20)
+    n_cycles: int
+    #: steps of such a period; changes of stick and slip are located within (default: 2000)
+    steps_per_period: int
+
+
 class Stress(TypedDict, total=False):
     """Group &stress: stress and endurance of a cycle, of models with /stress."""
 
@@ -875,6 +890,7 @@ class Groups(TypedDict, total=False):
     time: Time
     mode: Mode
     campbell: Campbell
+    ringdown: Ringdown
     stress: Stress
     output: Output
     control: Control

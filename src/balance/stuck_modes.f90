@@ -37,6 +37,7 @@ module fw_stuck_modes
       type(mode_choice) :: choice
    contains
       procedure :: choose
+      procedure :: undamped
       procedure :: list
       procedure :: frequency
       procedure :: shape_of
@@ -213,6 +214,17 @@ contains
 
       call choose_mode(self%pencil, self%rest, number, near, self%choice)
    end subroutine choose
+
+   !> The shape of a mode without damping, of any size (n_coordinates).
+   pure subroutine undamped(self, number, shape)
+      class(stuck_modes), intent(in) :: self
+      !> Of those in `omega`.
+      integer, intent(in) :: number
+      complex(wp), intent(out) :: shape(:)
+
+      shape = (0.0_wp, 0.0_wp)
+      shape(self%free) = self%rest%shape(:, number)
+   end subroutine undamped
 
    !> Frequencies of all modes that oscillate, as they are numbered [rad/s].
    subroutine list(self, omega)

@@ -14,6 +14,7 @@ module fw_case
    use fw_control_options, only: control_options
    use fw_harmonics_options, only: harmonics_options
    use fw_resonance_options, only: resonance_options
+   use fw_ringdown_options, only: ringdown_options
    use fw_sensitivity_options, only: sensitivity_options
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options
    use fw_stress_options, only: stress_options
@@ -26,7 +27,7 @@ module fw_case
    public :: analyses, case_type, output_options
    public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
              analysis_modes, analysis_mode, analysis_resonance, analysis_campbell, &
-             analysis_population
+             analysis_population, analysis_ringdown
 
    !> What the program knows of an analysis beside its word. A new one is a row of `analyses`, a
    !> line in fw_run and a file of its own.
@@ -46,16 +47,18 @@ module fw_case
       logical :: is_campbell = .false.
       !> Points of many disks, of which the largest counts: none is a row of the result.
       logical :: is_population = .false.
+      !> A free motion, from a start that is given.
+      logical :: is_ringdown = .false.
    end type analysis_facts
 
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
                          analysis_time = 4, analysis_modes = 5, analysis_mode = 6, &
                          analysis_resonance = 7, analysis_campbell = 8, &
-                         analysis_population = 9
+                         analysis_population = 9, analysis_ringdown = 10
    !> In the order of the constants.
    character(*), parameter :: analysis_words(*) = &
       [character(10) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance', &
-                        'campbell', 'population']
+                        'campbell', 'population', 'ringdown']
    type(analysis_facts), parameter :: analyses(*) = [ &
       analysis_facts(is_response=.true., is_sweep=.true.), &
       analysis_facts(is_response=.true.), &
@@ -65,7 +68,9 @@ module fw_case
       analysis_facts(is_free=.true., finds_frequency=.true.), &
       analysis_facts(is_resonance=.true., finds_frequency=.true.), &
       analysis_facts(is_campbell=.true., has_points=.false., is_balanced=.false.), &
-      analysis_facts(is_population=.true., is_response=.true., is_sweep=.true.)]
+      analysis_facts(is_population=.true., is_response=.true., is_sweep=.true.), &
+      analysis_facts(is_ringdown=.true., has_points=.false., is_balanced=.false., &
+                     is_integrated=.true.)]
 
    !> What is written (group &output).
    type :: output_options
@@ -125,6 +130,7 @@ module fw_case
       type(resonance_options) :: resonance
       type(stress_options) :: stress
       type(campbell_options) :: campbell
+      type(ringdown_options) :: ringdown
       !> Not allocated of a case that is none.
       type(population_options), allocatable :: population
       !> What others are read from; not allocated where none is.
@@ -153,8 +159,8 @@ contains
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear, '// &
                               'integration in time, natural frequencies, a nonlinear '// &
-                              'mode, a resonance, a Campbell diagram, or many '// &
-                              'mistuned disks'), &
+                              'mode, a resonance, a Campbell diagram, many '// &
+                              'mistuned disks, or free decay'), &
                           self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)

@@ -3,9 +3,8 @@
 !> The phrases stand in messages, so they name keys as the namelist has them. Those that begin with
 !> 'a law' are facts of the law of the pairs: a new law needs no new phrase.
 module fw_features
-   use fw_case, only: analysis_campbell, analysis_frf, analysis_mode, analysis_modes, &
-      analysis_point, analysis_population, analysis_resonance, analysis_time, analysis_wear, &
-      case_type
+   use fw_case, only: analyses, analysis_campbell, analysis_frf, analysis_mode, analysis_modes, &
+      analysis_point, analysis_population, analysis_resonance, analysis_wear, case_type
    use fw_contact_data, only: memory_carried
    use fw_control_options, only: of_first_harmonic
    use fw_force_law, only: law_facts
@@ -39,7 +38,9 @@ module fw_features
       growing_stability = 'sweep%stability = .true. where gaps or normal loads grow', &
       of_air = 'forces of the air', &
       of_campbell = "case%analysis = 'campbell'", &
-      of_population = "case%analysis = 'population'"
+      of_population = "case%analysis = 'population'", &
+      of_ringdown = "case%analysis = 'ringdown'", &
+      in_time = "case%analysis = 'time' or 'ringdown'"
 
 contains
 
@@ -102,8 +103,10 @@ contains
          asked = a == analysis_mode
       case ("case%analysis = 'resonance'")
          asked = a == analysis_resonance
-      case ("case%analysis = 'time'")
-         asked = a == analysis_time
+      case (in_time)
+         asked = analyses(a)%is_integrated
+      case (of_ringdown)
+         asked = analyses(a)%is_ringdown
       case ("resonance%parameter = 'model%rotation_speed'")
          asked = a == analysis_resonance .and. case%resonance%parameter == rotation_speed
       case ('a resonance%parameter of the matrices')

@@ -7,7 +7,8 @@ module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_features, only: growing_stability, asks_for, feature_length, feature_text, hysteretic, &
-      matrices_alone, moving_gaps, of_air, of_campbell, of_population, sliding_side, stress
+      in_time, matrices_alone, moving_gaps, of_air, of_campbell, of_population, of_ringdown, &
+      sliding_side, stress
    implicit none (type, external)
    private
 
@@ -54,7 +55,7 @@ module fw_rules
 
    !> Points of a sweep stand by themselves, have one length, or are compared with each other.
    type(rule_type), parameter :: of_sweeps(*) = [ &
-      rule_type('sweep%stability = .true.', "case%analysis = 'time'", &
+      rule_type('sweep%stability = .true.', in_time, &
                 'what an integration comes to is stable by itself; leave it out'), &
       rule_type("contact%memory = 'carried'", "sweep%continuation = 'arclength'", &
                 "a branch turns back on itself; use 'assembly'"), &
@@ -84,7 +85,7 @@ module fw_rules
                 'as a run with accuracy reports'), &
       rule_type('harmonics%accuracy', "contact%memory = 'carried'", "use 'assembly'"), &
       rule_type('contact%slider_1 or slider_2', "contact%memory = 'carried'", "use 'assembly'"), &
-      rule_type('contact%slider_1 or slider_2', "case%analysis = 'time'", "use 'frf' or 'point'"), &
+      rule_type('contact%slider_1 or slider_2', in_time, "use 'frf' or 'point'"), &
       rule_type('contact%slider_1 or slider_2', "case%analysis = 'mode'", 'leave it out'), &
       rule_type('contact%slider_1 or slider_2', 'a law that does not remember where pairs start', &
                 "use 'penalty' or 'dlft'"), &
@@ -135,7 +136,7 @@ module fw_rules
                 'give n_harmonics (left out, an accuracy chooses them), as many as a run of '// &
                 'the tuned wave reports'), &
       rule_type('cyclic%mistuned = .true.', 'group &control', 'give the load'), &
-      rule_type('group &cyclic', "case%analysis = 'time'", &
+      rule_type('group &cyclic', in_time, &
                 "use 'frf' or 'point', or model all sectors"), &
       rule_type('group &cyclic', 'sweep%stability = .true.', &
                 'a wave may become unstable to motions of other nodal diameters; leave it out'), &
@@ -153,11 +154,11 @@ module fw_rules
 
    !> Matrices without a time domain, or those that this part of the program does not take.
    type(rule_type), parameter :: of_matrices(*) = [ &
-      rule_type(hysteretic, "case%analysis = 'time'", &
+      rule_type(hysteretic, in_time, &
                 "has no time domain: use 'frf' or 'point', or viscous damping"), &
       rule_type(hysteretic, 'sweep%stability = .true.', &
                 'has no time domain: leave stability out, or use viscous damping'), &
-      rule_type(matrices_alone, "case%analysis = 'time'", "use 'frf' or 'point'"), &
+      rule_type(matrices_alone, in_time, "use 'frf' or 'point'"), &
       rule_type(matrices_alone, "solver%kind = 'pseudo_time'", "use 'newton'"), &
       rule_type(matrices_alone, 'output%tail', 'take more n_harmonics'), &
       rule_type('sweep%speed_order', &
@@ -186,7 +187,7 @@ module fw_rules
       rule_type('output%tail', "case%analysis other than 'frf' or 'point'", 'leave it out'), &
       rule_type('a law without events, whose force is smooth', "harmonics%sampling = 'events'", &
                 "leave it to 'auto'"), &
-      rule_type('a law that is not integrated in time', "case%analysis = 'time'", &
+      rule_type('a law that is not integrated in time', in_time, &
                 "use 'penalty' or 'dlft', or 'frf' and 'point'"), &
       rule_type('a law that does not measure slip', "case%analysis = 'wear'", &
                 "use 'dlft' (nodes without mass), 'dlft_velocity' or 'penalty'"), &
@@ -202,13 +203,19 @@ module fw_rules
       rule_type('sweep%stability = .true.', sliding_side, 'leave stability out'), &
       rule_type("contact%memory = 'carried'", sliding_side, "use 'assembly'")]
 
+   !> Released, it is left alone.
+   type(rule_type), parameter :: of_free_decay(*) = [ &
+      rule_type(of_ringdown, moving_gaps, 'a free decay has no excitation: leave them out'), &
+      rule_type(of_ringdown, sliding_side, &
+                'a free decay has no excitation: leave the speeds out')]
+
    !> Loads of supports are those of stiffness, damping and mass.
    type(rule_type), parameter :: of_base(*) = [ &
       rule_type('group &base', of_air, 'give the load that the base makes')]
 
    !> Groups of elements that are neither pairs nor springs.
    type(rule_type), parameter :: of_elements(*) = [ &
-      rule_type('states of a law of a user', "case%analysis = 'time'", &
+      rule_type('states of a law of a user', in_time, &
                 "use 'frf' or 'point'"), &
       rule_type('states of a law of a user', 'sweep%stability = .true.', &
                 'perturbations of its states are not followed: leave stability out')]
@@ -242,7 +249,7 @@ module fw_rules
 
    type(rule_type), parameter :: of_stress(*) = [ &
       rule_type(stress, "harmonics%method = 'hdhb'", "use 'hbm', or stress%output = 'none'"), &
-      rule_type(stress, "case%analysis = 'time'", &
+      rule_type(stress, in_time, &
                 "use 'frf' or 'point', or stress%output = 'none'"), &
       rule_type(stress, "resonance%parameter = 'model%rotation_speed'", &
                 "stress without motion changes with it: set stress%output = 'none'")]
@@ -250,7 +257,7 @@ module fw_rules
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
                                              of_matrices, of_laws, of_base, of_elements, of_wear, &
                                              of_derivatives, of_stress, of_diagrams, &
-                                             of_obstacles]
+                                             of_obstacles, of_free_decay]
 
 contains
 

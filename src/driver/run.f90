@@ -6,7 +6,7 @@ module fw_run
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_case, only: analyses, analysis_campbell, analysis_mode, analysis_modes, &
-      analysis_population, analysis_resonance, analysis_wear, case_type
+      analysis_population, analysis_resonance, analysis_ringdown, analysis_wear, case_type
    use fw_combinations, only: check_combinations
    use fw_error, only: error_type, fatal_error
    use fw_frequency_response, only: response_analysis
@@ -23,6 +23,7 @@ module fw_run
    use fw_run_modes, only: modes_analysis
    use fw_run_population, only: population_analysis
    use fw_run_resonance, only: resonance_analysis
+   use fw_run_ringdown, only: ringdown_analysis
    use fw_run_state, only: outcome_type
    use fw_strategy, only: kept_strategy
    use fw_summary, only: new_summary
@@ -46,6 +47,7 @@ contains
       case (analysis_modes); allocate (modes_analysis :: work)
       case (analysis_campbell); allocate (campbell_analysis :: work)
       case (analysis_population); allocate (population_analysis :: work)
+      case (analysis_ringdown); allocate (ringdown_analysis :: work)
       case (analysis_mode); allocate (mode_analysis :: work)
       case (analysis_resonance); allocate (resonance_analysis :: work)
       case (analysis_wear)

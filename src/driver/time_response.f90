@@ -33,7 +33,7 @@ module fw_time_response
    implicit none (type, external)
    private
 
-   public :: look_by_integration, time_strategy
+   public :: look_by_integration, take_corrected, time_strategy
 
    !> Tightest relative change from period to period that is asked for: changes of state that move
    !> by one of the smallest steps keep it from vanishing.

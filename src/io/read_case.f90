@@ -299,6 +299,7 @@ contains
       call case%time%bind_keys(reader)
       call read_mode(reader, case%analysis, case%mode)
       call read_campbell(reader, case%analysis, case%campbell)
+      call case%ringdown%bind_keys(reader, analyses(case%analysis)%is_ringdown)
       call read_stress(reader, case%stress)
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)

@@ -16,7 +16,7 @@ module fw_time_solution
    implicit none (type, external)
    private
 
-   public :: integrate_in_time, time_state
+   public :: integrate_in_time, row_memory, time_state
 
    !> Where the integration starts, at t = 0.
    type :: time_state

@@ -51,6 +51,7 @@ KEYS = {
     "mode": ["number", "near", "unit", "amplitudes", "start", "end", "control", "n_points",
              "continuation", "max_points", "synthesis"],
     "campbell": ["start", "end", "n_speeds", "orders", "order_scale", "peaks", "n_points"],
+    "ringdown": ["number", "amplitude", "n_cycles", "steps_per_period"],
     "population": ["n_patterns", "peaks", "quantity", "patterns"],
     "stress": ["method", "diagram", "endurance", "ultimate", "output"],
     "output": ["file", "histories", "contact", "tail", "observe"],

@@ -127,19 +127,17 @@ contains
 end module fw_run_toy
 """)
     toy.change("src/case/case.f90",
-               ("                        'campbell', 'population']\n   type",
-                "                        'campbell', 'population', 'toy']\n   type"),
-               ("             analysis_population\n\n",
-                "             analysis_population, analysis_toy\n\n"),
-               ("analysis_population = 9\n", "analysis_population = 9, analysis_toy = 10\n"),
-               ("is_response=.true., is_sweep=.true.)]",
-                "is_response=.true., is_sweep=.true.), &\n"
+               ("'ringdown']\n   type", "'ringdown', 'toy']\n   type"),
+               ("analysis_ringdown\n\n", "analysis_ringdown, analysis_toy\n\n"),
+               ("analysis_ringdown = 10\n", "analysis_ringdown = 10, analysis_toy = 11\n"),
+               ("is_integrated=.true.)]",
+                "is_integrated=.true.), &\n"
                 "      analysis_facts(has_points=.false., is_balanced=.false.)]"))
     toy.change("src/driver/run.f90",
                ("   use fw_run_state,",
                 "   use fw_run_toy, only: toy_analysis\n   use fw_run_state,"),
-               ("analysis_resonance, analysis_wear, case_type",
-                "analysis_resonance, analysis_wear, analysis_toy, case_type"),
+               ("analysis_ringdown, analysis_wear, case_type",
+                "analysis_ringdown, analysis_wear, analysis_toy, case_type"),
                ("      case (analysis_mode);",
                 "      case (analysis_toy); allocate (toy_analysis :: work)\n"
                 "      case (analysis_mode);"))

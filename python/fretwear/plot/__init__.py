@@ -30,6 +30,7 @@ from .response import (
     plot_response,
     read_response,
 )
+from .ringdown import plot_ringdown
 from .sensitivity import plot_sensitivity
 from .table import plot_table
 from .together import plot_envelope, plot_responses
@@ -41,6 +42,6 @@ __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "
            "plot_cycle", "plot_damper", "plot_damping", "plot_envelope", "plot_flanks",
            "plot_force", "plot_haigh", "plot_harmonics", "plot_hysteresis", "plot_mission",
            "plot_mode", "plot_nodal_diameters", "plot_optimum", "plot_population", "plot_resonance",
-           "plot_response", "plot_responses", "plot_safe", "plot_sensitivity", "plot_table",
-           "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps", "read_damping",
-           "read_response"]
+           "plot_response", "plot_responses", "plot_ringdown", "plot_safe", "plot_sensitivity",
+           "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",
+           "read_damping", "read_response"]

@@ -23,6 +23,7 @@ from .mode import plot_mode
 from .population import plot_population
 from .resonance import plot_resonance
 from .response import plot_response
+from .ringdown import plot_ringdown
 from .sensitivity import plot_sensitivity
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
@@ -142,6 +143,7 @@ KINDS: dict[str, Kind] = {
     "haigh": Kind("Stress amplitude over mean stress", lambda r: (
         "stress/amplitude" in r and r.n_points > 0 and bool(r.converged.any())),
         lambda r, c: plot_haigh(r, c.point)),
+    "ringdown": Kind("Free decay", _has("ringdown/observed"), lambda r, c: plot_ringdown(r)),
     "mode": Kind("Nonlinear mode", _is_mode, lambda r, c: plot_mode(r)),
     "backbone": Kind("Backbone of the mode", _is_mode, lambda r, c: plot_backbone(r, c.observe)),
     "resonance": Kind("Resonance over a parameter", _is_resonance, lambda r, c: plot_resonance(r)),
