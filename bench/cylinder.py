@@ -1,8 +1,9 @@
 """A cylinder on a flat against closed forms and a march of cycles: docs/cylinder_on_flat.md.
 
-    python -m bench.cylinder [--build build/release] [--large] [--count 60] [-o docs/...]
+    python -m bench.cylinder [PART ...] [--build build/release] [--count 60] [-o docs/...]
 
---large: grids of up to a thousand cells, for many minutes; their section stays without it.
+Parts: gross, partial, random, large; the first three without any. A part replaces its section.
+large are grids of up to a thousand cells, which take many minutes.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ CYCLES = (100.0, 1000.0, 5000.0, 18000.0)
 #: Cells and harmonics of partial slip; the second list takes minutes.
 GRIDS = ((30, 7), (60, 7), (120, 7), (60, 3), (120, 3), (60, 15))
 LARGE = ((240, 3), (240, 7), (480, 3), (480, 7), (996, 3), (996, 7))
+PARTS = ("gross", "partial", "random", "large")
 MICRO = 1e3
 
 
@@ -64,7 +66,7 @@ class Worn:
         found = self.result
         if "remarks/name" not in found:
             return "-"
-        return ", ".join(sorted({name.decode() for name in found["remarks/name"]}))
+        return ", ".join(sorted({str(name) for name in found["remarks/name"]}))
 
 
 def run(bench: Bench, name: str, model: Model, scar: Scar, n_harmonics: int,
@@ -211,11 +213,15 @@ def percent(value: float) -> str:
 def main() -> int:
     """Measure, and write the sections of the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", default=list(PARTS[:3]),
+                        help=f"{', '.join(PARTS)} (default: all but the last)")
     parser.add_argument("--build", type=Path, default=ROOT / "build" / "release")
-    parser.add_argument("--large", action="store_true", help="the large grids too")
     parser.add_argument("--count", type=int, default=60, help="random cylinders")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "cylinder_on_flat.md")
     options = parser.parse_args()
+    unknown = [part for part in options.parts if part not in PARTS]
+    if unknown:
+        parser.error(f"no part {unknown[0]!r}; choose from {', '.join(PARTS)}")
     pictures = options.output.parent / "images"
     pictures.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
@@ -226,19 +232,20 @@ def main() -> int:
             write_section(section, ["", *text.split("\n"), ""], options.output)
             print(text, flush=True)
 
-        machine = describe_machine(options.build)
-        measured("gross", gross(bench, pictures), machine)
-        machine = describe_machine(options.build)
-        *_, (lines, runs) = partial(bench, GRIDS, "## Partial slip, measured")
-        draw_partial(runs[120, 7], 120, pictures / "cylinder_partial.png")
-        measured("partial", lines, machine)
-        machine = describe_machine(options.build)
-        measured("random", random(bench, options.count), machine)
-        if options.large:
+        for part in options.parts:
             machine = describe_machine(options.build)
-            # Kept as they come: the last take longer than all others.
-            for lines, _ in partial(bench, LARGE, "## Large grids, measured"):
-                measured("large", lines, machine)
+            if part == "gross":
+                measured(part, gross(bench, pictures), machine)
+            elif part == "partial":
+                *_, (lines, runs) = partial(bench, GRIDS, "## Partial slip, measured")
+                draw_partial(runs[120, 7], 120, pictures / "cylinder_partial.png")
+                measured(part, lines, machine)
+            elif part == "random":
+                measured(part, random(bench, options.count), machine)
+            else:
+                # Kept as they come: the last take longer than all others.
+                for lines, _ in partial(bench, LARGE, "## Large grids, measured"):
+                    measured(part, lines, machine)
     return 0
 
 
