@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz notebooks wheel ways sensitivities resonances modes calibration stops controls
 .PHONY: parameters family
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
-.PHONY: bench-peers bench-full compare damper disk mistuned-disk paper
+.PHONY: bench-peers bench-full compare cylinder damper disk mistuned-disk paper
 .PHONY: thresholds
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
@@ -170,6 +170,10 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 
 damper: build ## tables and picture of docs/damper.md
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.dampers --build $(BUILD)
+
+cylinder: build ## tables and pictures of docs/cylinder_on_flat.md; PARTS=large: a thousand cells
+	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.cylinder --build $(BUILD) \
+	   $(PARTS)
 
 disk: build ## tables and pictures of docs/shrouded_disk.md
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk --build $(BUILD)

@@ -11,6 +11,8 @@ fretwear.laws
     Contact laws made of parallel pairs.
 fretwear.dampers
     Bodies between blades that only rotation presses.
+fretwear.halfplane
+    Generator of a cylinder on a flat, with the closed forms of its wear.
 fretwear.analyses
     Runs of the library in this process.
 fretwear.steps

@@ -39,6 +39,8 @@ class Scar:
     mu: float
     drag: float
     wear: float = 1e-7
+    #: Depth of the datum; 0 for DATUM.
+    datum: float = 0.0
 
     @property
     def place(self):
@@ -53,7 +55,7 @@ class Scar:
     def compliance(self):
         """Displacement of a cell by the traction force of another."""
         edges = np.abs(self.place[:, None] - self.place[None, :])
-        datum = DATUM * self.n * self.cell
+        datum = self.datum or DATUM * self.n * self.cell
 
         def primitive(s):
             return s * (np.log(datum / np.maximum(np.abs(s), 1e-300)) + 1.0)
@@ -112,6 +114,22 @@ def marched(scar):
     raise AssertionError("no steady state")
 
 
+def left_in_the_end(scar):
+    """Depths of the steady state, and the cells that never slide: they carry all load in the end,
+    and what wears is the gap that this closes. No march, one linear problem."""
+    compliance = scar.compliance()
+    force, _ = pressed(compliance, scar.gap, scar.load - scar.drag / scar.mu)
+    k = np.flatnonzero(force)
+    system = np.zeros((len(k) + 1, len(k) + 1))
+    system[:-1, :-1] = compliance[np.ix_(k, k)]
+    system[:-1, -1] = -1.0
+    system[-1, :-1] = 1.0
+    solution = np.linalg.solve(system, [*-scar.gap[k], scar.load])
+    depth = np.maximum(solution[-1] - scar.gap - compliance[:, k] @ solution[:-1], 0.0)
+    depth[k] = 0.0
+    return depth, k
+
+
 def slid(compliance, scar, depth, motion):
     """Path of every cell in a cycle in which the ground is led by `motion` to either side, times
     its force: cells slide by mu times the gap that is left where the body is raised by
@@ -130,10 +148,14 @@ def led(scar, motion, cycles):
     """Depths after so many cycles of gross slip."""
     compliance = scar.compliance()
     depth, done = np.zeros(scar.n), 0.0
+    # What wears by d bears less by d over the smallest compliance: half of the step at which
+    # pressures would swing from one cell to the next.
+    stiffest = 1.0 / np.linalg.eigvalsh(compliance)[0]
+    longest = 1.0 / (scar.wear / scar.cell * 4.0 * motion * stiffest)
     while done < cycles:
         rate = scar.wear / scar.cell * slid(compliance, scar, depth, motion)
         step = GROWTH * max(depth.max(), LEAST * scar.gap.max()) / rate.max()
-        step = min(step, cycles - done)
+        step = min(step, longest, cycles - done)
         middle = depth + 0.5 * step * rate
         depth = depth + step * scar.wear / scar.cell * slid(compliance, scar, middle, motion)
         done += step
