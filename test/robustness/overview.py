@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Add up the counts of docs/robustness.md and docs/robustness/inputs.md in the former."""
+"""Add up the counts of the pages in docs/robustness in the table of docs/robustness.md."""
 import sys
 from pathlib import Path
 
@@ -8,23 +8,27 @@ sys.path[:0] = [str(ROOT / "test/stress"), str(ROOT / "test/support")]
 from long_runs import MEMORY_GROWTH, TIME_GROWTH  # noqa: E402
 from sections import DOCUMENT, write_section  # noqa: E402
 
-INPUTS = DOCUMENT.parent / "robustness" / "inputs.md"
+PAGES = DOCUMENT.with_suffix("")
+INPUTS = PAGES / "inputs.md"
 KINDS = ["crash", "hang", "NaN", "false convergence", "lost data", "other"]
 CALLS = ["returned", "InputError", "ConvergenceError", "OutputError", "ValueError", "TypeError",
          "MemoryError"]
 CRASH_HANG = {"crash": ["crash"], "hang": ["hang"]}
 # Part, document, what stands before its table, word and columns of its size, columns of a kind.
 PARTS = [
-    ("[stress suite](#stress-suite)", DOCUMENT, "<!-- stress suite: begin -->", "cases", ["cases"],
+    ("[stress suite](robustness/stress-suite.md)", PAGES / "stress-suite.md",
+     "<!-- stress suite: begin -->", "cases", ["cases"],
      {**CRASH_HANG, "NaN": ["NaN"], "false convergence": ["false"], "other": ["silent"]}),
-    ("[faults](#faults)", DOCUMENT, "<!-- faults: begin -->", "tries", ["tries"],
+    ("[faults](robustness/faults.md)", PAGES / "faults.md", "<!-- faults: begin -->", "tries",
+     ["tries"],
      {**CRASH_HANG, "lost data": ["lost data", "half file"], "other": ["silent", "other numbers"]}),
     ("[hostile inputs](robustness/inputs.md)", INPUTS, "# Hostile inputs", "ends", list("023456"),
      {**CRASH_HANG, "NaN": ["NaN"], "other": ["silent"]}),
     ("[Python calls](robustness/inputs.md#calls-of-the-python-package)", INPUTS,
      "## Calls of the Python package", "calls", CALLS,
      {**CRASH_HANG, "NaN": ["NaN"], "other": ["silent", "other exception"]}),
-    ("[long runs](#long-runs)", DOCUMENT, "<!-- long runs: begin -->", "points", ["points"],
+    ("[long runs](robustness/long-runs.md)", PAGES / "long-runs.md", "<!-- long runs: begin -->",
+     "points", ["points"],
      {"other": ["grows"]})]
 
 
