@@ -39,6 +39,9 @@ class NodalDiameter:
     observe : mapping, optional
         Name of every observed quantity, with a row of factors (n,) complex; then all nodal
         diameters have the same names.
+    stress : (p, 6, n) complex, optional
+        Stress xx, yy, zz, xy, yz, zx at the points of the model's `stress` per coordinate, in
+        place of its `matrix` [force/length^3]; then all nodal diameters have it.
     """
 
     M: ArrayLike
@@ -51,6 +54,7 @@ class NodalDiameter:
     sine: ArrayLike | None = None
     static_rotation: ArrayLike | None = None
     observe: Mapping[str, ArrayLike] | None = None
+    stress: ArrayLike | None = None
 
     def checked(self, number: int) -> NodalDiameter:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -64,6 +68,9 @@ class NodalDiameter:
             parts["observe"] = {
                 text: array(f"{name}.observe['{text}']", row, (n,), dtype=np.complex128)
                 for text, row in self.observe.items()}
+        if self.stress is not None:
+            parts["stress"] = array(f"{name}.stress", self.stress, (None, 6, n),
+                                    dtype=np.complex128)
         return NodalDiameter(**parts)
 
     def datasets(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -73,6 +80,8 @@ class NodalDiameter:
                 yield name, _pairs(value)
         if self.observe is not None:
             yield "observe/matrix", _pairs(np.array(list(self.observe.values())))
+        if self.stress is not None:
+            yield "stress/matrix", _pairs(self.stress)
 
 
 @dataclass(frozen=True)
@@ -242,6 +251,8 @@ def read_sectors(file: h5py.File) -> Sectors | None:
                   for item, name in {**_MATRICES, **_LOADS}.items() if name in parts}
         if "observe/matrix" in parts:
             values["observe"] = dict(zip(names, _complexes(parts["observe/matrix"][()], turns)))
+        if "stress/matrix" in parts:
+            values["stress"] = _complexes(parts["stress/matrix"][()], turns)
         found[int(number)] = NodalDiameter(**values)
     return Sectors(n_sectors, **sides, diameters=found, n_physical=int(group.attrs["n_physical"]),
                    air=air)

@@ -60,7 +60,7 @@ def mistuned() -> fw.Model:
 
 def nodal() -> fw.Model:
     one = fw.NodalDiameter(EYE, EYE, EYE, EYE, 0.0 * EYE, EYE[0], EYE[0], EYE[0], EYE[0],
-                           observe={"tip": EYE[0]})
+                           observe={"tip": EYE[0]}, stress=np.zeros((2, 6, 6)))
     return fw.Model(None, None, None, contact=PAIRS,
                     sectors=fw.Sectors(3, diameters={0: one, 1: one}, n_physical=6,
                                        air=fw.Air(by_diameter={0: EYE})))

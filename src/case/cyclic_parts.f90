@@ -22,6 +22,8 @@ module fw_cyclic_parts
       complex(wp), allocatable :: observe(:, :)
       !> Per rotation speed.
       complex(wp), allocatable :: coriolis(:, :)
+      !> Stress of the points of /stress per coordinate (n, 6, n_points).
+      complex(wp), allocatable :: stress(:, :, :)
    contains
       procedure :: bind_parts => bind_diameter
    end type nodal_parts
@@ -96,6 +98,8 @@ contains
                    self%load_static_rotation)
       call to%bind(part(group//'observe/matrix', 'quantity order', 'rows of the quantities of '// &
                         '/observe/name'), self%observe)
+      call to%bind(part(group//'stress/matrix', 'stress 6 order', 'stress at points for each '// &
+                        'coordinate, in place of /stress/matrix'), self%stress)
    end subroutine bind_diameter
 
    !> Forces of the air, by sectors or by nodal diameters.

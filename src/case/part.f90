@@ -59,7 +59,8 @@ module fw_part
       integer, private :: extent(most_words) = -1
    contains
       generic :: bind => bind_text, bind_texts, bind_integer, bind_integers, bind_integer_matrix, &
-         bind_reals, bind_matrix, bind_tensor, bind_complex, bind_complex_matrix
+         bind_reals, bind_matrix, bind_tensor, bind_complex, bind_complex_matrix, &
+         bind_complex_tensor
       procedure(seek_part), deferred :: seek
       procedure(list_numbers), deferred :: numbers
       procedure :: note
@@ -71,7 +72,7 @@ module fw_part
       procedure :: extent_of
       procedure, private :: bind_text, bind_texts, bind_integer, bind_integers
       procedure, private :: bind_integer_matrix, bind_reals, bind_matrix, bind_complex
-      procedure, private :: bind_complex_matrix, bind_tensor
+      procedure, private :: bind_complex_matrix, bind_complex_tensor, bind_tensor
    end type part_source
 
    abstract interface
@@ -318,6 +319,16 @@ contains
       if (has(self, part, 'complex')) values = &
          transpose(reshape(complex_of(self), [self%dims(2), self%dims(3)]))
    end subroutine bind_complex_matrix
+
+   !> The same of three extents, the last one first.
+   subroutine bind_complex_tensor(self, part, values)
+      class(part_source), intent(inout) :: self
+      type(part_type), intent(in) :: part
+      complex(wp), allocatable, intent(inout) :: values(:, :, :)
+
+      if (has(self, part, 'complex')) values = &
+         reshape(complex_of(self), [self%dims(2), self%dims(3), self%dims(4)])
+   end subroutine bind_complex_tensor
 
    !> Pairs of reals as complex numbers.
    pure function complex_of(self) result(values)

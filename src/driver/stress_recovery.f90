@@ -97,6 +97,10 @@ contains
          associate (nodal => case%model%cyclic%nodal(k), rows => case%stress%rows)
             if (.not. allocated(nodal%mass)) cycle
             deallocate (nodal%observe)
+            if (allocated(nodal%stress)) then
+               nodal%observe = nodal%stress
+               cycle
+            end if
             allocate (nodal%observe(size(rows, 1), size(nodal%mass, 1)), source=(0.0_wp, 0.0_wp))
             nodal%observe(:, :case%model%n_dof) = rows
          end associate

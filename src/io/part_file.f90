@@ -271,7 +271,8 @@ contains
          if (rows*columns > 0 .and. rows == columns .and. (n < 0 .or. rows == n)) return
          call self%fail(part, 'is '//to_text(rows)//' x '//to_text(columns)//', expected a '// &
                         'square matrix of the order of the mass')
-      else if (part%shape == 'quantity order' .and. columns /= n) then
+      else if ((part%shape == 'quantity order' .or. part%shape == 'stress 6 order') .and. &
+               columns /= n) then
          call self%fail(part, 'has '//to_text(columns)//' columns, expected '//to_text(n))
       end if
    end subroutine check_complex

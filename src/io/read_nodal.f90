@@ -47,9 +47,45 @@ contains
             call add_waves(options, static, model, model%cyclic%nodal(k + 1))
          end associate
       end do
+      call take_stress(reader, raw, model)
       call stand_in(options, raw, model)
       model%cyclic%loss_factor = options%loss_factor
    end subroutine finish_nodal
+
+   !> Rows of stress of every nodal diameter, or of none; what is asked for by displacements alone
+   !> finds rows of zeros there.
+   subroutine take_stress(reader, raw, model)
+      type(reader_type), intent(inout) :: reader
+      type(raw_model), intent(inout) :: raw
+      type(model_type), intent(inout) :: model
+      integer :: k, n_points
+
+      n_points = 0
+      do k = 1, size(raw%cyclic%nodal)
+         associate (parts => raw%cyclic%nodal(k))
+            if (allocated(parts%mass) .and. allocated(parts%stress)) n_points = &
+               size(parts%stress, 3)
+         end associate
+      end do
+      if (n_points == 0) return
+      if (allocated(raw%stress%matrix)) then
+         call reader%refuse_model('stress/matrix beside that of nodal diameters: must be one '// &
+                                  'of both')
+         return
+      end if
+      do k = 1, size(raw%cyclic%nodal)
+         associate (parts => raw%cyclic%nodal(k), nodal => model%cyclic%nodal(k))
+            if (.not. allocated(parts%mass)) cycle
+            if (.not. allocated(parts%stress)) then
+               call reader%refuse_model('no nodal_diameter/'//to_text(k - 1)//'/stress/matrix, '// &
+                                        'which other nodal diameters have')
+               return
+            end if
+            nodal%stress = transpose(reshape(parts%stress, [size(parts%stress, 1), 6*n_points]))
+         end associate
+      end do
+      allocate (raw%stress%matrix(raw%cyclic%n_physical, 6, n_points), source=0.0_wp)
+   end subroutine take_stress
 
    !> Loads of other harmonics, on the displacements in front.
    pure subroutine add_waves(options, static, model, nodal)

@@ -22,6 +22,8 @@ module fw_cyclic_data
       complex(wp), allocatable :: load(:, :)
       !> Observed quantities (n_observed, n).
       complex(wp), allocatable :: observe(:, :)
+      !> Rows of stress that stand with this nodal diameter (6 n_points, n), where there are any.
+      complex(wp), allocatable :: stress(:, :)
       !> What the columns of the loads are.
       type(load_waves) :: waves
       !> Coriolis matrix times the rotation speed, skew-Hermitian (n, n), where there is one.

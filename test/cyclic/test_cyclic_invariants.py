@@ -4,7 +4,7 @@ import copy
 import numpy as np
 import pytest
 from annulus import Annulus, random_case
-from cases import run
+from cases import run, write_parts
 from cyclic_cases import TIGHT, difference, read, read_reference, run_at
 from nodal_file import tied, write_nodal_file
 
@@ -109,6 +109,55 @@ def test_matrices_of_nodal_diameters(tmp_path, phase):
                    "harmonics": {"n_harmonics": case["n_harmonics"], "sampling": "events"},
                    "sweep": {"values": OMEGAS}, "solver": {"tolerance": TIGHT}})
     assert_same(read(tmp_path / "case.h5"), sector)
+
+
+@pytest.mark.parametrize("phase", ["delay", "advance"])
+def test_stress_of_nodal_diameters(tmp_path, phase):
+    """Rows of stress with the nodal diameters, against the same of the unreduced sector."""
+    case = some_case(6, law="dlft")
+    n = len(case["model"]["mass"])
+    rows = np.random.default_rng(11).normal(size=(3, 6, n))
+    diameters = {}
+    for k in range(case["n_sectors"] // 2 + 1):
+        diameters[k], kept = tied(case, k)
+        diameters[k]["stress/matrix"] = rows @ diameters[k].pop("observe/matrix")
+    place = {i + 1: p + 1 for p, i in enumerate(kept)}
+    contact = {name: [[int(np.sign(d)) * place[abs(d)] if d else 0 for d in side]
+                      for side in case["contact"][name]] for name in ("side_1", "side_2")}
+    contact |= {name: case["contact"][name] for name in ("sector_2", "mu", "gap")}
+    found = []
+    for name in ("nodal", "sector"):
+        (tmp_path / name).mkdir()
+        path = tmp_path / name / "model.h5"
+        if name == "nodal":
+            write_nodal_file(path, case["n_sectors"], len(kept), diameters, phase=phase,
+                             contact=contact)
+        else:
+            write_parts(path, {key: case["model"][key] for key in (
+                "mass", "stiffness", "damping")} | {
+                f"load/{key}": values for key, values in case["load"].items()} | {
+                f"contact/{key}": case["contact"][key] for key in (
+                    "side_1", "side_2", "sector_2", "mu", "gap")} | {
+                "cyclic@n_sectors": case["n_sectors"], "cyclic/left": case["model"]["left"],
+                "cyclic/right": case["model"]["right"], "stress/matrix": rows})
+        run(path.parent, {"case": {"analysis": "frf"},
+                          "model": {"source": "hdf5", "file": "model.h5"},
+                          "cyclic": {"engine_order": case["engine_order"]},
+                          "contact": {"law": "dlft"}, "stress": {"output": "tensor"},
+                          "harmonics": {"n_harmonics": case["n_harmonics"], "sampling": "events"},
+                          "sweep": {"values": OMEGAS}, "solver": {"tolerance": TIGHT}})
+        found.append(read(path.parent / "case.h5"))
+    assert np.abs(found[1]["stress/coefficients"]).max() > 0.1
+    for name in ("stress/coefficients", "stress/amplitude", "stress/mean"):
+        assert difference(found[0][name], found[1][name]) < SAME
+    del diameters[1]["stress/matrix"]
+    write_nodal_file(tmp_path / "model.h5", case["n_sectors"], len(kept), diameters,
+                     contact=contact)
+    done = run(tmp_path, {"case": {"analysis": "frf"},
+                          "model": {"source": "hdf5", "file": "model.h5"},
+                          "cyclic": {"engine_order": case["engine_order"]},
+                          "sweep": {"values": OMEGAS}}, status=3)
+    assert "no nodal_diameter/1/stress/matrix" in done.stderr
 
 
 def test_reference_of_reduced_nodal_diameters(tmp_path):
