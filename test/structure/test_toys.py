@@ -127,11 +127,11 @@ contains
 end module fw_run_toy
 """)
     toy.change("src/case/case.f90",
-               ("                        'campbell', 'population']\n   type",
-                "                        'campbell', 'population', 'toy']\n   type"),
-               ("             analysis_population\n\n",
-                "             analysis_population, analysis_toy\n\n"),
-               ("analysis_population = 9\n", "analysis_population = 9, analysis_toy = 10\n"),
+               ("                        'campbell', 'population', 'bounds']\n   type",
+                "                        'campbell', 'population', 'bounds', 'toy']\n   type"),
+               ("             analysis_population, analysis_bounds\n\n",
+                "             analysis_population, analysis_bounds, analysis_toy\n\n"),
+               ("analysis_bounds = 10\n", "analysis_bounds = 10, analysis_toy = 11\n"),
                ("is_response=.true., is_sweep=.true.)]",
                 "is_response=.true., is_sweep=.true.), &\n"
                 "      analysis_facts(has_points=.false., is_balanced=.false.)]"))
