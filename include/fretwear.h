@@ -95,7 +95,7 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
    n_rows n_dof:  "row/matrix", displacements that are combinations of dofs, row after row
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
-                  "contact/slider_1", "contact/slider_2",
+                  "contact/slider_1", "contact/slider_2", "contact/residual",
                   "contact/gap_rotation", "contact/normal_load_rotation",
                   "contact/tangential_stiffness", "contact/normal_stiffness",
                   "contact/normal_coefficient", "contact/normal_exponent",

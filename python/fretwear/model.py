@@ -58,6 +58,9 @@ class ContactPairs:
         What each square of the rotation speed adds to them [length s^2], [force s^2].
     slider_1, slider_2 : float or (n_pairs,), optional
         Displacement along t1 and t2 where an assembled pair is unstrained [length], 0 by default.
+    residual : float or (n_pairs,), optional
+        Residual traction of pairs that never slip, from -1 to 1: the lower and the upper end of
+        what balances; of cases with `memory = 'residual'`.
     tangential_stiffness, normal_stiffness : float or (n_pairs,), optional
         Stiffness of the elastic law ('penalty') [force/length]; the tangential one also that of
         the laws of hysteresis ('iwan', 'bouc_wen') for the smallest motion.
@@ -133,6 +136,7 @@ class ContactPairs:
     gap_harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None
     slider_1: ArrayLike | None = None
     slider_2: ArrayLike | None = None
+    residual: ArrayLike | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -706,6 +710,7 @@ _SLIDES = ("path", "steady")
 _HYSTERESIS = ("iwan_chi", "iwan_beta", "bouc_wen_exponent", "bouc_wen_beta")
 _PRESSING = ("normal_coefficient", "normal_exponent", "reference_force", "decay_length")
 _IN_NAMELIST = ("normal_load", "gap_rotation", "normal_load_rotation", "slider_1", "slider_2",
+                "residual",
                 "tangential_stiffness", "normal_stiffness", *_PRESSING, *_SLIDING, *_HYSTERESIS)
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}

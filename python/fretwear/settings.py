@@ -12,6 +12,10 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
+__all__ = ["UNITS", "Base", "Body", "Bounds", "Campbell", "CaseGroup", "Contact", "Control",
+           "Cyclic", "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode",
+           "Output", "Polynomial", "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver",
+           "Spring", "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
 __all__ = ["UNITS", "Base", "Body", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic",
            "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output",
            "Polynomial", "Population", "PseudoTime", "Resonance", "Ringdown", "Sensitivity",
@@ -93,6 +97,9 @@ class CaseGroup(TypedDict, total=False):
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
     #: a sweep, one frequency, wear, integration in time, natural frequencies, a nonlinear mode, a
+    #: resonance, a Campbell diagram, many mistuned disks, or a range over (default: 'frf')
+    analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
+                      "population", "bounds"]
     #: resonance, a Campbell diagram, many mistuned disks, or free decay (default: 'frf')
     analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
                       "population", "ringdown"]
@@ -136,7 +143,8 @@ class Resonance(_Resonance, total=False):
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
                        "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
                        "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
-                       "mistuning%scale", "body%mass"]
+                       "mistuning%scale", "body%mass", "contact%residual", "contact%slider_1",
+                       "contact%slider_2"]
     #: first value, or factor; only: analysis = 'resonance' (required, else 0)
     start: float
     #: last value, or factor; only: analysis = 'resonance' (required, else 0)
@@ -384,14 +392,17 @@ class Contact(TypedDict, total=False):
     #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity', 'rigid'
     #: (default: 1)
     penalty_scale: float
-    #: where pairs that never slip start: unstrained, or as the last point ended (default:
-    #: 'assembly')
-    memory: Literal["assembly", "carried"]
+    #: where pairs that never slip start: unstrained, as the last point ended, or with the traction
+    #: that residual says (default: 'assembly')
+    memory: Literal["assembly", "carried", "residual"]
     #: [L] displacement along t1 where an assembled pair is unstrained; of those that never slip
     #: (default: of the file, else 0)
     slider_1: ArrayLike
     #: [L] the same along t2 (default: of the file, else 0)
     slider_2: ArrayLike
+    #: residual traction of pairs that never slip: -1 and 1 are the ends of what balances, 0 is
+    #: between them; only: memory = 'residual' (default: of the file, else 0)
+    residual: ArrayLike
     #: what moves the obstacle, or makes it uneven: terms added to gap (default: 0)
     n_gap_terms: int
     #: pair, from 1; 0: all (default: 0)
@@ -613,7 +624,8 @@ class Sweep(_Sweep, total=False):
                        "polynomial%coefficient", "damper%coefficient", "model%loss_factor",
                        "contact%slip_speed", "contact%mu_dynamic", "mistuning%frequency",
                        "mistuning%damping_ratio", "mistuning%stiffness", "mistuning%mass",
-                       "mistuning%scale", "body%mass"]
+                       "mistuning%scale", "body%mass", "contact%residual", "contact%slider_1",
+                       "contact%slider_2"]
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)
@@ -801,6 +813,15 @@ class Campbell(TypedDict, total=False):
     n_points: int
 
 
+class Bounds(TypedDict, total=False):
+    """Group &bounds: lowest and highest response over all residual tractions."""
+
+    #: of which the range is looked for: of the first observed quantity, or of the pairs (default:
+    #: 'first_harmonic')
+    quantity: Literal["first_harmonic", "largest", "dissipation", "wear_volume"]
+    #: residual tractions to start from: the centre, both ends of the gradient, and corners that are
+    #: drawn (default: 4)
+    n_starts: int
 class Ringdown(TypedDict, total=False):
     """Group &ringdown: free decay from the shape of a mode."""
 
@@ -890,6 +911,7 @@ class Groups(TypedDict, total=False):
     time: Time
     mode: Mode
     campbell: Campbell
+    bounds: Bounds
     ringdown: Ringdown
     stress: Stress
     output: Output

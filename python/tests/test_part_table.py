@@ -22,7 +22,7 @@ from fretwear.sectors import _MATRICES
 
 PAIRS = fw.ContactPairs(
     [[1, 2, 3]], [[4, 5, 6]], mu=0.3, gap=0.0, area=1.0, normal_load=0.0, position=[[0, 0, 0]],
-    gap_rotation=0.0, normal_load_rotation=0.0, slider_1=0.0, slider_2=0.0,
+    gap_rotation=0.0, normal_load_rotation=0.0, slider_1=0.0, slider_2=0.0, residual=0.0,
     tangential_stiffness=1.0, normal_stiffness=1.0, slip_speed=1.0, patch=["a"], sector_2=[0],
     mu_dynamic=0.2, weakening_speed=1.0, weakening_exponent=1.0, mu_viscous=0.0, speed_1=0.0,
     speed_2=0.0, iwan_chi=-0.5, iwan_beta=0.0, bouc_wen_exponent=1.0, bouc_wen_beta=0.5,

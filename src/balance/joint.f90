@@ -3,7 +3,7 @@
 module fw_joint
    use fw_kinds, only: wp
    use fw_case_forces, only: element_rows
-   use fw_contact_data, only: contact_type, spring_type, memory_carried
+   use fw_contact_data, only: contact_type, spring_type, memory_carried, memory_residual
    use fw_cyclic_relative, only: cyclic_relative, new_cyclic_relative
    use fw_elements, only: element_list
    use fw_error, only: error_type, fatal_error, status_input
@@ -450,7 +450,7 @@ contains
       if (contact%n_pairs > 0) then
          facts = facts_of(contact)
          symmetric = symmetric .and. facts%is_odd .and. all(joint%row(3, :) == 0) .and. &
-                     contact%memory /= memory_carried .and. &
+                     all(contact%memory /= [memory_carried, memory_residual]) .and. &
                      .not. (allocated(contact%slider_1) .or. allocated(contact%slider_2))
       end if
       if (springs%n_springs > 0) symmetric = symmetric .and. all(modulo(springs%power, 2) == 1)

@@ -23,6 +23,7 @@ module fw_parameter_slopes
    use fw_fourier, only: fourier_type, new_fourier
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
+   use fw_pair_law, only: pair_law
    use fw_parameters, only: blade_frequency, friction_coefficient, gap, harmonic_scale, &
       is_of_elements, is_of_matrices, is_of_sectors, is_per_pair, normal_coefficient, normal_load, &
       normal_stiffness, parameter_group, parameter_key, reference_force, spring_coefficient, &
@@ -135,11 +136,27 @@ contains
             work%x_start = source%x_start
             work%mean = source%mean
             work%rate = source%rate
+            call take_shares(self, state)
             call self%law%evaluate(self%fourier, work)
             call self%law%linearize(self%fourier, work)
          end associate
       end associate
    end subroutine prepare
+
+   !> Residual tractions may have changed since the twin was made.
+   subroutine take_shares(self, state)
+      class(slope_finder), intent(inout) :: self
+      type(balance_state), intent(in) :: state
+
+      select type (law => state%problem%forces%entry(state%problem%forces%pairs)%law)
+      class is (pair_law)
+         if (.not. allocated(law%share)) return
+         select type (twin => self%law)
+         class is (pair_law)
+            call twin%take_shares(law%share)
+         end select
+      end select
+   end subroutine take_shares
 
    subroutine find_work_at_rest(self, state)
       class(slope_finder), intent(inout) :: self
@@ -224,6 +241,7 @@ contains
             call input_of(self, state, parameter, input)
             call multiply_twin(work, i, input, output)
          end if
+         if (parameter%number == tangential_stiffness) call add_start(self, i, output)
          ! mu acts on friction alone, and not on what presses.
          if (parameter%number == friction_coefficient) output(:, 3) = 0.0_wp
          do c = 1, 3
@@ -237,6 +255,29 @@ contains
          end do
       end associate
    end subroutine by_pair
+
+   !> Where a pair starts from goes with its stiffness: x = k slider.
+   subroutine add_start(self, pair, output)
+      class(slope_finder), intent(in) :: self
+      integer, intent(in) :: pair
+      real(wp), intent(inout) :: output(:, :)
+      real(wp) :: by_slider(size(output, 1), size(output, 2))
+      character(*), parameter :: key(2) = ['slider_1', 'slider_2']
+      logical :: is_known
+      integer :: c
+
+      select type (law => self%law)
+      class is (pair_law)
+         ! The stiffness of a rigid pair is no number of the pair.
+         if (.not. allocated(law%slider) .or. law%prediction%takes(pair)) return
+         do c = 1, 2
+            if (.not. law%prediction%stiffness(pair, c) > 0.0_wp) cycle
+            call law%by_constant(pair, key(c), self%fourier, self%work, by_slider, is_known)
+            if (.not. is_known) return
+            output = output + law%slider(pair, c)/law%prediction%stiffness(pair, c)*by_slider
+         end do
+      end select
+   end subroutine add_start
 
    !> Derivative of the inputs of a pair by a number of it (n_coefficients of the twin, 3).
    subroutine input_of(self, state, parameter, input)

@@ -1,6 +1,7 @@
 !> A case: everything that one run needs, validated. Composed of the option types of the layers
 !> that use them; see each for its defaults.
 module fw_case
+   use fw_bounds_options, only: bounds_options
    use fw_campbell_options, only: campbell_options
    use fw_case_source, only: case_source
    use fw_body, only: body_type
@@ -27,7 +28,7 @@ module fw_case
    public :: analyses, case_type, output_options
    public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
              analysis_modes, analysis_mode, analysis_resonance, analysis_campbell, &
-             analysis_population, analysis_ringdown
+             analysis_population, analysis_bounds, analysis_ringdown
 
    !> What the program knows of an analysis beside its word. A new one is a row of `analyses`, a
    !> line in fw_run and a file of its own.
@@ -54,11 +55,11 @@ module fw_case
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
                          analysis_time = 4, analysis_modes = 5, analysis_mode = 6, &
                          analysis_resonance = 7, analysis_campbell = 8, &
-                         analysis_population = 9, analysis_ringdown = 10
+                         analysis_population = 9, analysis_bounds = 10, analysis_ringdown = 11
    !> In the order of the constants.
    character(*), parameter :: analysis_words(*) = &
       [character(10) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance', &
-                        'campbell', 'population', 'ringdown']
+                        'campbell', 'population', 'bounds', 'ringdown']
    type(analysis_facts), parameter :: analyses(*) = [ &
       analysis_facts(is_response=.true., is_sweep=.true.), &
       analysis_facts(is_response=.true.), &
@@ -69,6 +70,7 @@ module fw_case
       analysis_facts(is_resonance=.true., finds_frequency=.true.), &
       analysis_facts(is_campbell=.true., has_points=.false., is_balanced=.false.), &
       analysis_facts(is_population=.true., is_response=.true., is_sweep=.true.), &
+      analysis_facts(is_response=.true., is_sweep=.true.), &
       analysis_facts(is_ringdown=.true., has_points=.false., is_balanced=.false., &
                      is_integrated=.true.)]
 
@@ -130,6 +132,7 @@ module fw_case
       type(resonance_options) :: resonance
       type(stress_options) :: stress
       type(campbell_options) :: campbell
+      type(bounds_options) :: bounds
       type(ringdown_options) :: ringdown
       !> Not allocated of a case that is none.
       type(population_options), allocatable :: population
@@ -159,8 +162,8 @@ contains
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear, '// &
                               'integration in time, natural frequencies, a nonlinear '// &
-                              'mode, a resonance, a Campbell diagram, many '// &
-                              'mistuned disks, or free decay'), &
+                              'mode, a resonance, a Campbell diagram, many mistuned '// &
+                              'disks, a range over residual tractions, or free decay'), &
                           self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)

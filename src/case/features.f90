@@ -3,9 +3,10 @@
 !> The phrases stand in messages, so they name keys as the namelist has them. Those that begin with
 !> 'a law' are facts of the law of the pairs: a new law needs no new phrase.
 module fw_features
-   use fw_case, only: analyses, analysis_campbell, analysis_frf, analysis_mode, analysis_modes, &
-      analysis_point, analysis_population, analysis_resonance, analysis_wear, case_type
-   use fw_contact_data, only: memory_carried
+   use fw_case, only: analyses, analysis_bounds, analysis_campbell, analysis_frf, analysis_mode, &
+      analysis_modes, analysis_point, analysis_population, analysis_resonance, analysis_wear, &
+      case_type
+   use fw_contact_data, only: memory_carried, memory_residual
    use fw_control_options, only: of_first_harmonic
    use fw_force_law, only: law_facts
    use fw_harmonics_options, only: method_hbm, method_hdhb, sampling_events, sampling_uniform
@@ -39,6 +40,7 @@ module fw_features
       of_air = 'forces of the air', &
       of_campbell = "case%analysis = 'campbell'", &
       of_population = "case%analysis = 'population'", &
+      of_bounds = "case%analysis = 'bounds'", &
       of_ringdown = "case%analysis = 'ringdown'", &
       in_time = "case%analysis = 'time' or 'ringdown'"
 
@@ -121,6 +123,8 @@ contains
          asked = all(a /= [analysis_frf, analysis_point])
       case (of_population)
          asked = a == analysis_population
+      case (of_bounds)
+         asked = a == analysis_bounds
       case ("case%analysis other than 'frf', 'point', 'population' or 'resonance'")
          asked = all(a /= [analysis_frf, analysis_point, analysis_population, analysis_resonance])
       case ("case%analysis other than 'frf', 'point', 'resonance' or 'mode'")
@@ -257,6 +261,12 @@ contains
       case ('contact%slider_1 or slider_2')
          asked = pairs .and. (allocated(case%contact%slider_1) .or. &
                               allocated(case%contact%slider_2))
+      case ("contact%memory = 'residual'")
+         asked = pairs .and. case%contact%memory == memory_residual
+      case ("contact%memory other than 'residual'")
+         asked = case%contact%memory /= memory_residual
+      case ('contact%residual')
+         asked = pairs .and. allocated(case%contact%residual)
       case ("contact%memory = 'carried'")
          asked = pairs .and. case%contact%memory == memory_carried
       case (moving_gaps)

@@ -9,8 +9,8 @@ module fw_parameter_values
    use fw_parameters, only: blade_frequency, body_mass, friction_coefficient, gap, harmonic_scale, &
       is_of_elements, is_of_matrices, is_of_sectors, is_per_pair, is_per_spring, loss_factor, &
       mistuning_scale, modal_damping, normal_load, normal_stiffness, parameter_group, &
-      parameter_key, rayleigh_mass, rayleigh_stiffness, rotation_speed, static_scale, &
-      tangential_stiffness
+      parameter_key, rayleigh_mass, rayleigh_stiffness, residual_share, rotation_speed, slider_1, &
+      slider_2, static_scale, tangential_stiffness
    implicit none (type, external)
    private
 
@@ -49,6 +49,9 @@ contains
          case (gap); values = c%gap
          case (tangential_stiffness); values = c%tangential_stiffness
          case (normal_stiffness); values = c%normal_stiffness
+         case (residual_share); values = c%residual
+         case (slider_1); values = c%slider_1
+         case (slider_2); values = c%slider_2
          case (harmonic_scale); values = [case%model%harmonic_scale]
          case (static_scale); values = [case%model%static_scale]
          case default
@@ -98,6 +101,9 @@ contains
          case (gap); c%gap = values
          case (tangential_stiffness); c%tangential_stiffness = values
          case (normal_stiffness); c%normal_stiffness = values
+         case (residual_share); c%residual = values
+         case (slider_1); c%slider_1 = values
+         case (slider_2); c%slider_2 = values
          case (harmonic_scale)
             call scale_vibration(values(1)/m%harmonic_scale, m)
             m%harmonic_scale = values(1)

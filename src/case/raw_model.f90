@@ -218,6 +218,8 @@ contains
       call to%bind(part('contact/slider_1', each, 'displacement along t1 where an assembled '// &
                         'pair is unstrained'), pairs%slider_1)
       call to%bind(part('contact/slider_2', each, 'the same along t2'), pairs%slider_2)
+      call to%bind(part('contact/residual', each, 'residual traction of pairs that never slip, '// &
+                        '-1 to 1'), pairs%residual)
       call to%bind(part('contact/normal_load', each, 'constant compressive force of pairs '// &
                         'without a normal dof'), pairs%normal_load)
       call to%bind(part('contact/gap_rotation', each, 'added to the gap, for each square of '// &

@@ -7,8 +7,8 @@ module fw_rules
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_features, only: growing_stability, asks_for, feature_length, feature_text, hysteretic, &
-      in_time, matrices_alone, moving_gaps, of_air, of_campbell, of_population, of_ringdown, &
-      sliding_side, stress
+      in_time, matrices_alone, moving_gaps, of_air, of_bounds, of_campbell, of_population, &
+      of_ringdown, sliding_side, stress
    implicit none (type, external)
    private
 
@@ -20,7 +20,8 @@ module fw_rules
       character(128) :: remedy
    end type rule_type
 
-   character(*), parameter :: between = ' does not go with '
+   character(*), parameter :: between = ' does not go with ', &
+                              of_residual = "contact%memory = 'residual'"
 
    !> Nonlinear modes and resonances are balances of given harmonics with borders of their own,
    !> followed by Newton's method.
@@ -92,6 +93,19 @@ module fw_rules
       rule_type('contact%slider_1 or slider_2', &
                 'a law of hysteresis, whose paths start at the assembly', 'leave it out'), &
       rule_type('contact%slider_1 or slider_2', 'a law that takes integrals between its events', &
+                "use 'penalty' or 'dlft'"), &
+      rule_type('contact%residual', "contact%memory other than 'residual'", &
+                "set memory = 'residual'"), &
+      rule_type(of_residual, 'pairs with two tangential directions', &
+                "use 'assembly' with contact%slider_1 and slider_2"), &
+      rule_type(of_residual, in_time, "use 'frf' or 'point'"), &
+      rule_type(of_residual, "case%analysis = 'mode'", "use 'assembly'"), &
+      rule_type(of_residual, 'sweep%stability = .true.', 'leave stability out'), &
+      rule_type(of_residual, 'a law that does not remember where pairs start', &
+                "use 'penalty' or 'dlft'"), &
+      rule_type(of_residual, 'a law of hysteresis, whose paths start at the assembly', &
+                "use 'assembly'"), &
+      rule_type(of_residual, 'a law that takes integrals between its events', &
                 "use 'penalty' or 'dlft'")]
 
    !> The factor of the load is an unknown of its own: what follows solves without such a border,
@@ -151,6 +165,17 @@ module fw_rules
       rule_type(of_population, 'sweep%refine = .true.', 'rows are not kept; leave it out'), &
       rule_type(of_population, 'output%histories', 'points are not kept; leave it out'), &
       rule_type(of_population, "contact%memory = 'carried'", "use 'assembly'")]
+
+   !> A range is over residual tractions at given frequencies, by derivatives of a balance of given
+   !> harmonics.
+   type(rule_type), parameter :: of_ranges(*) = [ &
+      rule_type(of_bounds, "contact%memory = 'carried'", "use 'assembly'"), &
+      rule_type(of_bounds, 'a case without contact pairs', &
+                'give group &contact, or take a model file with contact'), &
+      rule_type(of_bounds, "harmonics%method other than 'hbm'", "use 'hbm'"), &
+      rule_type(of_bounds, "solver%kind other than 'newton'", "use 'newton'"), &
+      rule_type(of_bounds, "sweep%continuation = 'arclength'", "use 'natural'"), &
+      rule_type(of_bounds, 'sweep%parameter', 'sweep over the frequency')]
 
    !> Matrices without a time domain, or those that this part of the program does not take.
    type(rule_type), parameter :: of_matrices(*) = [ &
@@ -256,7 +281,7 @@ module fw_rules
 
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
                                              of_matrices, of_laws, of_base, of_elements, of_wear, &
-                                             of_derivatives, of_stress, of_diagrams, &
+                                             of_derivatives, of_stress, of_diagrams, of_ranges, &
                                              of_obstacles, of_free_decay]
 
 contains

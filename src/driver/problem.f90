@@ -8,7 +8,6 @@ module fw_problem
    use fw_cyclic_structure, only: cyclic_structure, new_cyclic_structure
    use fw_error, only: error_type, fatal_error, status_input
    use fw_case_forces, only: new_forces
-   use fw_contact_data, only: contact_type
    use fw_force_list, only: force_list
    use fw_fourier, only: fourier_type, new_fourier, fft_pays
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, method_tcm, &
@@ -79,30 +78,12 @@ contains
       end if
       if (allocated(error)) return
       call new_balance_state(problem, system, stand)
-      call assemble(case%contact, problem, system)
       if (allocated(fullest) .and. .not. case%over%is_wanted()) then
          call move_structure(case%model, case%sweep%start, .false., system, error)
          if (allocated(error)) return
       end if
       call let_move(case, system, error)
    end subroutine build_system
-
-   !> Pairs that are unstrained where they do not stand: their march starts there.
-   subroutine assemble(contact, problem, system)
-      type(contact_type), intent(in) :: contact
-      type(balance_problem), intent(in) :: problem
-      type(balance_state), intent(inout) :: system
-
-      if (contact%n_pairs == 0) return
-      associate (law => problem%forces%entry(problem%forces%pairs)%law, &
-                 work => system%work(problem%forces%pairs))
-         if (.not. allocated(work%x_start)) return
-         if (allocated(contact%slider_1)) work%x_start(:, 1) = law%prediction%stiffness(:, 1)* &
-                                                               contact%slider_1
-         if (allocated(contact%slider_2)) work%x_start(:, 2) = law%prediction%stiffness(:, 2)* &
-                                                               contact%slider_2
-      end associate
-   end subroutine assemble
 
    !> Give the state the parameter that the case goes over, and its first value; that of a given
    !> amplitude is the load, whatever the response goes along.

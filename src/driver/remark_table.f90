@@ -114,6 +114,9 @@ module fw_remark_table
       remark_kind('campbell points', &
                   'campbell: frequencies near a crossing that could not be solved: its peak '// &
                   'may be missed'), &
+      remark_kind('bounds without solution', &
+                  'bounds: residual tractions for which no solution was found: they are no '// &
+                  'ends of the range, which may be wider'), &
       remark_kind('population peaks', &
                   'population: maxima between rows that took more solutions than they may: '// &
                   'the largest amplitude that was solved stands for them'), &

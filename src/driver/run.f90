@@ -5,7 +5,7 @@ module fw_run
    use fw_analysis, only: analysis, run_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_case, only: analyses, analysis_campbell, analysis_mode, analysis_modes, &
+   use fw_case, only: analyses, analysis_bounds, analysis_campbell, analysis_mode, analysis_modes, &
       analysis_population, analysis_resonance, analysis_ringdown, analysis_wear, case_type
    use fw_combinations, only: check_combinations
    use fw_error, only: error_type, fatal_error
@@ -18,6 +18,7 @@ module fw_run
    use fw_problem, only: build_system, threads_for
    use fw_remarks, only: remark_input
    use fw_restart_file, only: read_restart, restart_type
+   use fw_run_bounds, only: bounds_analysis
    use fw_run_campbell, only: campbell_analysis
    use fw_run_mode, only: mode_analysis
    use fw_run_modes, only: modes_analysis
@@ -47,6 +48,7 @@ contains
       case (analysis_modes); allocate (modes_analysis :: work)
       case (analysis_campbell); allocate (campbell_analysis :: work)
       case (analysis_population); allocate (population_analysis :: work)
+      case (analysis_bounds); allocate (bounds_analysis :: work)
       case (analysis_ringdown); allocate (ringdown_analysis :: work)
       case (analysis_mode); allocate (mode_analysis :: work)
       case (analysis_resonance); allocate (resonance_analysis :: work)

@@ -12,11 +12,11 @@ module fw_contact_data
    private
 
    public :: contact_type, spring_type
-   public :: memory_words, memory_assembly, memory_carried
+   public :: memory_words, memory_assembly, memory_carried, memory_residual
    public :: sliding_words, sliding_path, sliding_steady
 
-   character(*), parameter :: memory_words(*) = [character(8) :: 'assembly', 'carried']
-   integer, parameter :: memory_assembly = 1, memory_carried = 2
+   character(*), parameter :: memory_words(*) = [character(8) :: 'assembly', 'carried', 'residual']
+   integer, parameter :: memory_assembly = 1, memory_carried = 2, memory_residual = 3
    character(*), parameter :: sliding_words(*) = [character(6) :: 'path', 'steady']
    integer, parameter :: sliding_path = 1, sliding_steady = 2
 
@@ -77,6 +77,9 @@ module fw_contact_data
       !> Tangential displacements of unstrained pairs, along t1 and t2 (n_pairs) [length]: 0 where
       !> they are not allocated.
       real(wp), allocatable :: slider_1(:), slider_2(:)
+      !> Of pairs that can stick throughout, where their residual traction lies between the least
+      !> and the largest that balance: -1 to 1 (n_pairs); allocated with memory = 'residual'.
+      real(wp), allocatable :: residual(:)
       !> Coordinates of the pairs, for pictures (3, n_pairs), and the names of their patches.
       real(wp), allocatable :: position(:, :)
       type(string_type), allocatable :: patch(:)
@@ -135,6 +138,7 @@ contains
       call level_values(self%n_alike, self%normal_load_rotation)
       call level_values(self%n_alike, self%slider_1)
       call level_values(self%n_alike, self%slider_2)
+      call level_values(self%n_alike, self%residual)
       call level_values(self%n_alike, self%tangential_stiffness)
       call level_values(self%n_alike, self%normal_stiffness)
       call self%constants%level(self%n_alike)

@@ -235,11 +235,16 @@ contains
       call keys%bind(key('penalty_scale', 'multiplies the automatic eps of the rigid laws', &
                          above(0.0_wp), only="law = 'dlft', 'dlft_velocity', 'rigid'"), &
                      contact%penalty_scale)
-      call keys%bind_word(key('memory', 'where pairs that never slip start: unstrained, or as '// &
-                              'the last point ended'), contact%memory, memory_words)
+      call keys%bind_word(key('memory', 'where pairs that never slip start: unstrained, as the '// &
+                              'last point ended, or with the traction that residual says'), &
+                          contact%memory, memory_words)
       call keys%bind(slider_key('slider_1', 'displacement along t1 where an assembled pair is '// &
                             'unstrained; of those that never slip'), contact%slider_1)
       call keys%bind(slider_key('slider_2', 'the same along t2'), contact%slider_2)
+      call keys%bind(key('residual', 'residual traction of pairs that never slip: -1 and 1 are '// &
+                         'the ends of what balances, 0 is between them', from_to(-1.0_wp, 1.0_wp), &
+                         shape='n_pairs', absent='of the file, else 0', &
+                         only="memory = 'residual'"), contact%residual)
 
    contains
 

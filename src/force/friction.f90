@@ -47,6 +47,7 @@ module fw_friction
       procedure :: form_jacobian
       procedure :: fractions
       procedure :: located
+      procedure :: by_constant
    end type friction_law
 
    !> What the march leaves beside the workspace.
@@ -57,6 +58,11 @@ module fw_friction
       logical, allocatable :: settled(:)
       !> Whether a pair that rests was moved on the way to its rest (n_pairs).
       logical, allocatable :: moved(:)
+      !> Of pairs whose residual traction is given: half of the distance between its ends, 0 of
+      !> pairs that no traction keeps from slipping [force] (n_pairs), and the instants of the lower
+      !> and of the upper end (2, n_pairs).
+      real(wp), allocatable :: reach(:)
+      integer, allocatable :: ends(:, :)
       !> Of the harmonics, where the analysis is the projection.
       type(wave_table) :: waves
       !> Room for derivatives of one pair after the other, from step to step.
@@ -168,6 +174,8 @@ contains
       allocate (room)
       allocate (room%margin(self%n_elements), source=0.0_wp)
       allocate (room%settled(self%n_elements), room%moved(self%n_elements), source=.false.)
+      allocate (room%reach(self%n_elements), source=0.0_wp)
+      allocate (room%ends(2, self%n_elements), source=0)
       if (fourier%projects .and. self%n_elements > 0) call room%waves%build(fourier)
       if (march_pays(self, fourier)) then
          allocate (work%march)
@@ -209,6 +217,7 @@ contains
       integer :: n_blocks, block, k
 
       call self%take_friction(work)
+      call self%take_start(work)
       do k = 1, size(wanted)
          wanted(k) = any(self%present(k, :))
       end do
@@ -242,12 +251,14 @@ contains
       if (self%facts%is_curved) then
          where (work%state == pair_stuck) work%state = pair_mixed
       end if
+      ! Nor is one whose position follows from its own inputs.
+      where (room%reach > 0.0_wp) work%state = pair_mixed
       if (work%measures_slip) then
          ! The march has ended where it started, so one more turn over the same prediction is the
          ! period.
          call slip_work(self%n_elements, fourier%n_time, work%mu, work%prediction_time, &
                         self%facts%remembers, work%x, work%slip)
-         where (work%rests) work%slip = 0.0_wp
+         where (work%rests .or. room%reach > 0.0_wp) work%slip = 0.0_wp
       end if
    end subroutine evaluate_at_instants
 
@@ -263,6 +274,11 @@ contains
       first = (block - 1)*block_size + 1
       last = min(first + block_size - 1, self%n_elements)
       call march(self, work, room, fourier%n_time, first, last)
+      if (allocated(self%share) .and. self%facts%remembers) then
+         do pair = first, last
+            call hold(self, work, room, fourier%n_time, pair)
+         end do
+      end if
       if (self%facts%remembers .or. .not. fourier%has_constant()) return
       do pair = first, last
          ! On a side that slides nothing comes to rest.
@@ -363,6 +379,48 @@ contains
       end if
       call march_to_limit(self, work, room, n_time, first, last)
    end subroutine march
+
+   !> A pair with one tangential direction that some residual traction keeps from slipping: its
+   !> position stands between the ends of what its bounds P - Q and P + Q leave over the period,
+   !> where its share says. Where they leave nothing the march has the last word.
+   subroutine hold(self, work, room, n_time, pair)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer, intent(in) :: n_time, pair
+      real(wp) :: lower, upper, p, q
+      integer :: k, t
+
+      room%reach(pair) = 0.0_wp
+      ! An anchor that is carried along holds no pair for ever.
+      if (count(self%present(1:2, pair)) /= 1 .or. self%prediction%drags(pair)) return
+      t = merge(1, 2, self%present(1, pair))
+      lower = -huge(1.0_wp)
+      upper = huge(1.0_wp)
+      do k = 1, n_time
+         p = work%prediction_time(pair, t, k)
+         ! Not cut off at 0: of a pair that opens the bounds then leave nothing.
+         q = -work%mu(pair)*work%prediction_time(pair, 3, k)
+         if (p - q > lower) then
+            lower = p - q
+            room%ends(1, pair) = k
+         end if
+         if (p + q < upper) then
+            upper = p + q
+            room%ends(2, pair) = k
+         end if
+      end do
+      if (.not. lower < upper) return
+      room%reach(pair) = 0.5_wp*(upper - lower)
+      work%x(pair, t) = 0.5_wp*(1.0_wp - self%share(pair))*lower + &
+                        0.5_wp*(1.0_wp + self%share(pair))*upper
+      work%force_time(pair, t, :) = work%prediction_time(pair, t, :) - work%x(pair, t)
+      ! Nothing of the march counts.
+      room%margin(pair) = 0.0_wp
+      room%settled(pair) = .false.
+      work%turns(pair) = 1
+      work%drift(pair) = 0.0_wp
+   end subroutine hold
 
    !> From the stated start to where a turn repeats.
    subroutine march_to_limit(self, work, room, n_time, first, last)
@@ -509,6 +567,29 @@ contains
          work%x(i, :) = x
       end do
    end subroutine find_limits
+
+   !> What a pair has of its assembly; all else acts through the inputs.
+   pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
+      class(friction_law), intent(in) :: self
+      integer, intent(in) :: element
+      character(*), intent(in) :: name
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(inout) :: force(:, :)
+      logical, intent(out) :: is_known
+
+      is_known = .false.
+      force = 0.0_wp
+      if (.not. self%facts%remembers) return
+      select type (room => work%room)
+      type is (friction_room)
+         ! The smallest margin and pressure are those of all turns, the first one included.
+         call self%by_memory(element, name, fourier, room%margin(element) >= 0.0_wp .and. &
+                             work%pressure(element) > 0.0_wp .and. &
+                             .not. room%reach(element) > 0.0_wp, room%reach(element), force, &
+                             is_known)
+      end select
+   end subroutine by_constant
 
    subroutine located(self, law)
       class(friction_law), intent(in) :: self

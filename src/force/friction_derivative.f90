@@ -208,13 +208,65 @@ contains
       type(derivative_room), intent(inout) :: of_pair
 
       call of_pair%sums%reserve(fourier)
-      if (.not. work%differentiates_slip .and. count(self%present(1:2, i)) == 1 .and. &
+      if (room%reach(i) > 0.0_wp) then
+         call differentiate_held(self, fourier, room, i, work, of_pair)
+      else if (.not. work%differentiates_slip .and. count(self%present(1:2, i)) == 1 .and. &
           .not. self%facts%is_curved) then
          call differentiate_one_direction(self, fourier, room, i, work, of_pair)
       else
          call differentiate_rows(self, fourier, room, i, work, of_pair)
       end if
    end subroutine differentiate_pair
+
+   !> Of a pair that its residual traction keeps from slipping, lambda_t = y_t - z: with E the base
+   !> functions at the instants a, b of the ends of z, and t its share,
+   !>
+   !>   dz = (1 - t)/2 (dy_t + mu dy_n)(a) + (1 + t)/2 (dy_t - mu dy_n)(b),
+   !>
+   !> which is a constant over the period: it takes from harmonic 0 alone.
+   subroutine differentiate_held(self, fourier, room, i, work, of_pair)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(friction_room), intent(in) :: room
+      integer, intent(in) :: i
+      type(force_workspace), intent(inout) :: work
+      type(derivative_room), intent(inout) :: of_pair
+      real(wp) :: pressing, weight
+      integer :: k, mean, nc, place, side
+
+      nc = fourier%n_coefficients
+      place = merge(0, nc, self%present(1, i))
+      work%jacobian(:, place + 1:place + nc, i) = 0.0_wp
+      do k = 1, nc
+         work%jacobian(place + k, place + k, i) = 1.0_wp
+      end do
+      if (fourier%has_constant()) then
+         mean = place + fourier%column(1)
+         do side = -1, 1, 2
+            k = room%ends(merge(1, 2, side < 0), i)
+            weight = 0.5_wp*(1.0_wp + real(side, wp)*self%share(i))
+            associate (column => work%jacobian(:, mean, i))
+               column(place + 1:place + nc) = column(place + 1:place + nc) - &
+                                              weight*fourier%synthesis(:, k)
+               if (.not. self%present(3, i)) cycle
+               pressing = 1.0_wp
+               if (self%facts%is_curved) pressing = work%pressing(i, k)
+               column(2*nc + 1:) = column(2*nc + 1:) + (real(side, wp)*weight*work%mu(i)* &
+                                                        pressing)*fourier%synthesis(:, k)
+            end associate
+         end do
+      end if
+      if (work%differentiates_slip) work%slip_derivative(:, i) = 0.0_wp
+      if (self%facts%is_curved .and. self%present(3, i)) then
+         of_pair%turn%pressing = work%pressing(i, :)
+         call of_pair%sums%form(fourier, room%waves, 3*nc, work%jacobian(2*nc + 1, 2*nc + 1, i), &
+                                of_pair%turn%pressing)
+         return
+      end if
+      of_pair%sums%wanted = work%prediction_time(i, 3, :) < 0.0_wp
+      call project_normal(work%jacobian(:, :, i), fourier, room%waves, of_pair%sums, &
+                          self%present(3, i))
+   end subroutine differentiate_held
 
    !> Of a pair with one tangential direction whose path of slip nobody asks for.
    subroutine differentiate_one_direction(self, fourier, room, i, work, of_pair)

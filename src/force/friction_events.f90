@@ -21,6 +21,7 @@ module fw_friction_events
       procedure :: sample
       procedure :: coefficients
       procedure :: fractions
+      procedure :: by_constant
    end type friction_by_events
 
    !> Paths of all pairs: what evaluation leaves for derivative, samples and results.
@@ -45,6 +46,8 @@ contains
       if (allocated(law%present)) self%present = law%present
       if (allocated(law%mu)) self%mu = law%mu
       if (allocated(law%worn)) self%worn = law%worn
+      if (allocated(law%slider)) self%slider = law%slider
+      if (allocated(law%share)) self%share = law%share
    end function follow_events
 
    !> The instants of `fourier` are a grid that isolates events: four for each wave are enough.
@@ -69,9 +72,13 @@ contains
 
       if (self%n_elements == 0) return
       call self%take_friction(work)
+      call self%take_start(work)
       select type (room => work%room)
       class is (event_room)
          if (allocated(self%worn)) call room%paths%take_friction(work%mu)
+         if (allocated(self%share) .and. self%facts%remembers) then
+            call room%paths%take_shares(self%share)
+         end if
          ! Rates leave the mean position open: for pairs that come to rest it goes along.
          if (any(self%prediction%order > 0) .and. fourier%has_constant()) then
             call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
@@ -173,6 +180,27 @@ contains
          call room%paths%coefficients(fourier, computed%harmonic, force)
       end select
    end subroutine coefficients
+
+   !> What a pair has of its assembly; all else acts through the inputs.
+   pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
+      class(friction_by_events), intent(in) :: self
+      integer, intent(in) :: element
+      character(*), intent(in) :: name
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(inout) :: force(:, :)
+      logical, intent(out) :: is_known
+
+      is_known = .false.
+      force = 0.0_wp
+      if (.not. self%facts%remembers) return
+      select type (room => work%room)
+      class is (event_room)
+         call self%by_memory(element, name, fourier, room%paths%closed(element) .and. &
+                             .not. room%paths%moved(element), room%paths%reach(element), force, &
+                             is_known)
+      end select
+   end subroutine by_constant
 
    !> Shares of stick, slip and open (3, n_pairs), by durations.
    pure subroutine fractions(self, work, share)

@@ -1,7 +1,7 @@
 !> Laws of contact pairs: components (t1, t2, n), friction, and a normal force that presses,
 !> either constant or from the distance of the two sides.
 module fw_pair_law
-   use fw_contact_data, only: contact_type
+   use fw_contact_data, only: contact_type, memory_residual
    use fw_force_law, only: prediction_type, force_law, force_workspace
    use fw_fourier, only: fourier_type
    use fw_gap_motion, only: take_gap_motion
@@ -25,6 +25,12 @@ module fw_pair_law
       logical :: two_directions = .false.
       !> How the pairs press (n_elements); springs where it is not allocated.
       type(normal_law), allocatable :: normal(:)
+      !> Tangential displacements where assembled pairs are unstrained (n_elements, 2) [length]; not
+      !> allocated where they stand unstrained.
+      real(wp), allocatable :: slider(:, :)
+      !> Of pairs that can stick throughout: where their residual traction is between the ends of
+      !> what balances, -1 to 1 (n_elements); not allocated where the march says it.
+      real(wp), allocatable :: share(:)
    contains
       procedure :: build
       procedure :: bind_keys
@@ -33,6 +39,10 @@ module fw_pair_law
       procedure :: take_pairs
       procedure :: take_normal
       procedure :: take_speeds
+      procedure :: take_memory
+      procedure :: take_start
+      procedure :: take_shares
+      procedure :: by_memory
       procedure :: note_curves
       procedure :: reserve
       procedure :: reserve_normal
@@ -75,8 +85,69 @@ contains
       end associate
       call take_growth(contact, self%prediction)
       call take_gap_motion(contact, self%prediction%gap_motion)
+      call self%take_memory(contact)
       call self%take_constants(contact)
    end subroutine build
+
+   !> What pairs that never slip have of their assembly.
+   pure subroutine take_memory(self, contact)
+      class(pair_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+
+      if (allocated(contact%slider_1) .or. allocated(contact%slider_2)) then
+         allocate (self%slider(contact%n_pairs, 2), source=0.0_wp)
+         if (allocated(contact%slider_1)) self%slider(:, 1) = contact%slider_1
+         if (allocated(contact%slider_2)) self%slider(:, 2) = contact%slider_2
+      end if
+      if (contact%memory == memory_residual) call self%take_shares(contact%residual)
+   end subroutine take_memory
+
+   !> Other shares of the residual tractions (n_elements), of a law that is built.
+   pure subroutine take_shares(self, shares)
+      class(pair_law), intent(inout) :: self
+      real(wp), intent(in) :: shares(:)
+
+      self%share = shares
+   end subroutine take_shares
+
+   !> Before an evaluation: the march of pairs that are unstrained elsewhere starts there. The
+   !> stiffness is that of now, which a rigid law has from the structure.
+   pure subroutine take_start(self, work)
+      class(pair_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+
+      if (allocated(self%slider)) work%x_start = self%prediction%stiffness(:, :2)*self%slider
+   end subroutine take_start
+
+   !> `by_constant` of laws that remember, for what pairs have of their assembly: the tangential
+   !> force of a pair that never slips is y - x, and x is k times the slider, or between its ends.
+   pure subroutine by_memory(self, element, name, fourier, is_unmoved, reach, force, is_known)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element
+      character(*), intent(in) :: name
+      type(fourier_type), intent(in) :: fourier
+      !> Whether nothing has moved the pair from its start; half of the distance between the ends
+      !> of its residual traction, 0 where the march says it [force].
+      logical, intent(in) :: is_unmoved
+      real(wp), intent(in) :: reach
+      !> (n_coefficients, n_components).
+      real(wp), intent(inout) :: force(:, :)
+      logical, intent(out) :: is_known
+      integer :: c
+
+      force = 0.0_wp
+      is_known = any(name == [character(8) :: 'slider_1', 'slider_2', 'residual'])
+      if (.not. (is_known .and. fourier%has_constant())) return
+      do c = 1, 2
+         if (.not. self%present(c, element)) cycle
+         if (name == 'residual') then
+            force(fourier%column(1), c) = -reach
+         else if (is_unmoved .and. name == merge('slider_1', 'slider_2', c == 1)) then
+            ! Others forget where they started.
+            force(fourier%column(1), c) = -self%prediction%stiffness(element, c)
+         end if
+      end do
+   end subroutine by_memory
 
    !> Of gaps and normal loads, where the rotation speed follows the frequency.
    pure subroutine take_growth(contact, prediction)

@@ -2,7 +2,7 @@
 !> values that they cannot take: for every group that takes words of fw_parameters.
 module fw_parameter_checks
    use fw_case, only: case_type
-   use fw_contact_data, only: contact_type
+   use fw_contact_data, only: contact_type, memory_residual
    use fw_deviation, only: deviation_type, of_frequency
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
@@ -16,7 +16,8 @@ module fw_parameter_checks
       is_of_matrices, is_of_sectors, is_per_pair, is_per_spring, mistuning_scale, mu_dynamic, &
       normal_coefficient, normal_load, normal_stiffness, not_negative, of_closing, of_pressed, &
       of_sliding, parameter_group, parameter_key, parameter_words, parameters, positive, &
-      reference_force, rotation_speed, static_scale, tangential_stiffness
+      reference_force, residual_share, rotation_speed, slider_1, slider_2, static_scale, &
+      tangential_stiffness, within_one
    use fw_read_mistuning, only: negative_mass
    use fw_solver_options, only: continuation_natural
    use fw_text, only: to_text
@@ -27,6 +28,7 @@ module fw_parameter_checks
    public :: check_parameter, check_parameter_sweep, check_scales, pairs_of
 
    character(*), parameter :: swept = 'sweep%parameter', derived = 'sensitivity%parameters'
+   integer, parameter :: of_assembly(*) = [residual_share, slider_1, slider_2]
 
 contains
 
@@ -104,7 +106,8 @@ contains
          reason = 'there are no contact pairs: give group &contact'
          return
       end if
-      if (all(number /= [friction_coefficient, normal_load, gap])) then
+      if (any(number == of_assembly)) call check_of_assembly(contact, number, reason)
+      if (all(number /= [friction_coefficient, normal_load, gap, of_assembly])) then
          call parameter_key(number, key)
          if (all(pairs_are_rigid(contact)) .and. any(number == [tangential_stiffness, &
                                                                 normal_stiffness])) then
@@ -137,6 +140,28 @@ contains
       case default; reason = 'every pair has a normal dof, whose motion presses it'
       end select
    end subroutine check_of_pairs
+
+   !> What pairs have of their assembly where the case says so. With two directions a pair may come
+   !> to rest on the way that its start decides on: the derivative of that way is not there.
+   subroutine check_of_assembly(contact, number, reason)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: number
+      character(:), allocatable, intent(inout) :: reason
+      character(24) :: key
+
+      call parameter_key(number, key)
+      select case (number)
+      case (residual_share)
+         if (contact%memory /= memory_residual) reason = "contact%memory is not 'residual'"
+      case default
+         if (.not. allocated(contact%slider_1) .and. number == slider_1 .or. &
+             .not. allocated(contact%slider_2) .and. number == slider_2) then
+            reason = 'contact%'//trim(key)//' is not given (values of 0 serve)'
+         else if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, 1))) then
+            reason = 'its derivative is not known of pairs with two tangential directions'
+         end if
+      end select
+   end subroutine check_of_assembly
 
    !> Matrices of a sector are not the parameter's own, but of its waves.
    subroutine check_of_matrices(case, number, reason)
@@ -241,12 +266,28 @@ contains
          case default ! of all of them
          end select
          if (.not. allocated(c%law_of)) return
-         if (any(number == [friction_coefficient, normal_load, gap])) return
+         if (any(number == [friction_coefficient, normal_load, gap, of_assembly])) return
          ! A constant of some laws alone.
          call parameter_key(number, key)
          counts = counts .and. [(c%constants%is_taken(c%law_of(i), key), i=1, c%n_pairs)]
       end associate
    end function pairs_of
+
+   !> A sweep of what is from -1 to 1, whatever it is a factor of.
+   subroutine check_within_one(case, base, error)
+      type(case_type), intent(in) :: case
+      !> Values of the case (n).
+      real(wp), intent(in) :: base(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: far
+
+      far = maxval(abs(case%over%ends()))
+      if (case%over%as == as_factor) far = far*maxval(abs(base))
+      if (far <= 1.0_wp) return
+      call fatal_error(error, 'sweep goes to '//number_text(far)//' of '// &
+                       trim(parameter_words(case%over%number))//': must stay from -1 to 1', &
+                       status_input)
+   end subroutine check_within_one
 
    !> A sweep over another parameter than the frequency.
    subroutine check_parameter_sweep(case, error)
@@ -296,6 +337,7 @@ contains
          select case (parameters(over%number)%sign)
          case (not_negative); if (lowest < 0.0_wp) call refuse_lowest('at least 0')
          case (positive); if (.not. lowest > 0.0_wp) call refuse_lowest('above 0')
+         case (within_one); call check_within_one(case, base, error)
          case default ! any
          end select
          if (over%number == mistuning_scale) call check_scales( &

@@ -1,8 +1,8 @@
 !> From a namelist file to a validated case.
 module fw_read_case
    use fw_combinations, only: check_combinations
-   use fw_case, only: analyses, case_type
-   use fw_contact_data, only: memory_carried, sliding_path
+   use fw_case, only: analyses, analysis_bounds, case_type
+   use fw_contact_data, only: contact_type, memory_carried, memory_residual, sliding_path
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, sampling_uniform, usual_accuracy
    use fw_kinds, only: wp
@@ -212,7 +212,9 @@ contains
                 h%n_time == 0 .and. .not. case%output%histories .and. &
                 .not. any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)) .and. &
                 .not. feeds_energy(case) .and. &
-                .not. (c%slides() .and. c%sliding == sliding_path)
+                .not. (c%slides() .and. c%sliding == sliding_path) .and. &
+                c%memory /= memory_residual .and. &
+                .not. (allocated(c%slider_1) .or. allocated(c%slider_2))
       end associate
    end function goes_with_events
 
@@ -238,7 +240,7 @@ contains
       if (reader%given('harmonics', 'accuracy')) return
       if (case%sensitivity%is_wanted()) return
       if (analyses(case%analysis)%finds_frequency .or. &
-          case%control%is_wanted()) then
+          case%analysis == analysis_bounds .or. case%control%is_wanted()) then
          case%harmonics%n_harmonics = usual_harmonics
          call reader%amend('harmonics', 'n_harmonics', to_text(usual_harmonics))
          return
@@ -299,6 +301,7 @@ contains
       call case%time%bind_keys(reader)
       call read_mode(reader, case%analysis, case%mode)
       call read_campbell(reader, case%analysis, case%campbell)
+      call case%bounds%bind_keys(reader)
       call case%ringdown%bind_keys(reader, analyses(case%analysis)%is_ringdown)
       call read_stress(reader, case%stress)
       case%output%file = stem_of(path)//'.h5'
@@ -307,6 +310,18 @@ contains
       if (.not. reader%failed()) call raw%base%observe(case%model%observe_matrix)
       call read_control(reader, case%model, case%control)
    end subroutine read_keys
+
+   !> Residual tractions are what a range is over, whatever the assembly is: its middle comes
+   !> first.
+   subroutine open_range(contact)
+      type(contact_type), intent(inout) :: contact
+
+      ! What depends on the points before has no range, and is refused by its rule.
+      if (contact%memory == memory_carried) return
+      contact%memory = memory_residual
+      if (allocated(contact%residual)) deallocate (contact%residual)
+      allocate (contact%residual(contact%n_pairs), source=0.0_wp)
+   end subroutine open_range
 
    !> What the model was formed by is what the key has.
    subroutine check_order(reader, case)
@@ -467,6 +482,7 @@ contains
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
+      if (case%analysis == analysis_bounds) call open_range(case%contact)
       call read_obstacle(reader, case%model%cyclic, case%contact, gap_order)
       call case%contact%turn(options%rotation_speed, options%speed_order)
       ! What finds whether anything depends on the speed looks there.

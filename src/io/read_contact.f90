@@ -3,7 +3,7 @@
 !> The arrays of a file apply only to the pairs of the file: whoever gives another number of pairs
 !> gives their dofs too, and starts without the constants of others.
 module fw_read_contact
-   use fw_contact_data, only: contact_type, spring_type
+   use fw_contact_data, only: contact_type, memory_residual, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
       bind_growth, bind_normal_load, bind_laws, bind_march, bind_n_springs, bind_springs
    use fw_key_range, only: range_type
@@ -48,6 +48,7 @@ contains
                                                 any(curved_pairs(contact))), contact)
       call read_law(reader, contact)
       call bind_march(reader, contact)
+      call read_residual(reader, contact)
       scale = contact%penalty_scale
       if (.not. is_rigid(contact) .and. abs(scale - 1.0_wp) > 0.0_wp) then
          call reader%refuse('contact', 'penalty_scale', 'has no meaning with law = '// &
@@ -55,6 +56,23 @@ contains
                             'scale the stiffnesses themselves')
       end if
    end subroutine read_contact
+
+   !> Residual tractions in the middle of what balances, unless they are given: values of a file
+   !> have passed no range.
+   subroutine read_residual(reader, contact)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(inout) :: contact
+      integer :: i
+
+      if (allocated(contact%residual)) then
+         i = findloc(abs(contact%residual) <= 1.0_wp, .false., dim=1)
+         if (i > 0) call reader%refuse('contact', 'residual', '= '// &
+                                       to_text(contact%residual(i))//' for pair '//to_text(i)// &
+                                       ': must be from -1 to 1')
+      else if (contact%memory == memory_residual) then
+         allocate (contact%residual(contact%n_pairs), source=0.0_wp)
+      end if
+   end subroutine read_residual
 
    !> The number of pairs, and what the file says of them where it is about the same pairs.
    subroutine read_n_pairs(reader, file_pairs, n_sectors, contact)
@@ -81,6 +99,7 @@ contains
          call repeat_values(n_file, n_sectors, contact%normal_load_rotation)
          call repeat_values(n_file, n_sectors, contact%slider_1)
          call repeat_values(n_file, n_sectors, contact%slider_2)
+         call repeat_values(n_file, n_sectors, contact%residual)
          call contact%constants%offer_all(file_pairs%constants, n_file, n_sectors)
       else if (n_file > 0 .and. contact%n_pairs > 0 &
                .and. .not. reader%given('contact', 'side_1')) then

@@ -13,8 +13,8 @@ module fw_parameters
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
              rotation_speed, rayleigh_mass, rayleigh_stiffness, normal_coefficient, &
              reference_force, loss_factor, slip_speed, mu_dynamic, blade_frequency, &
-             mistuning_scale, body_mass
-   public :: of_sliding, of_closing, of_pressed, not_negative, positive
+             mistuning_scale, body_mass, residual_share, slider_1, slider_2
+   public :: of_sliding, of_closing, of_pressed, not_negative, positive, within_one
 
    integer, parameter :: harmonic_scale = 1, static_scale = 2, friction_coefficient = 3, &
                          normal_load = 4, gap = 5, tangential_stiffness = 6, &
@@ -25,6 +25,7 @@ module fw_parameters
    !> The first and the last of those in which sectors differ, in the order of fw_deviation.
    integer, parameter :: blade_frequency = 20, mistuning_scale = 24
    integer, parameter :: body_mass = 25
+   integer, parameter :: residual_share = 26, slider_1 = 27, slider_2 = 28
 
    !> Where its values are: one of the loads, one for each pair or spring, one of the matrices, one
    !> for each of a group of other elements (its coefficient), one for each sector or for each row
@@ -35,7 +36,7 @@ module fw_parameters
    !> a constant load presses, as they have no normal dof.
    integer, parameter :: of_sliding = 1, of_closing = 2, of_pressed = 3
    !> What a value may be.
-   integer, parameter :: any_sign = 0, not_negative = 1, positive = 2
+   integer, parameter :: any_sign = 0, not_negative = 1, positive = 2, within_one = 3
 
    !> A parameter: its name, its unit, and where it stands in a case.
    type :: parameter_type
@@ -77,7 +78,10 @@ module fw_parameters
       parameter_type('mistuning%stiffness', of_sectors), &
       parameter_type('mistuning%mass', of_sectors), &
       parameter_type('mistuning%scale', of_sectors), &
-      parameter_type('body%mass', of_matrices, positive)]
+      parameter_type('body%mass', of_matrices, positive), &
+      parameter_type('contact%residual', of_pairs, within_one, of_sliding), &
+      parameter_type('contact%slider_1', of_pairs, any_sign, of_sliding), &
+      parameter_type('contact%slider_2', of_pairs, any_sign, of_sliding)]
 
    integer, parameter :: n_parameter_words = size(parameters)
    character(*), parameter :: parameter_words(*) = parameters%word

@@ -46,7 +46,7 @@ def test_a_misspelled_part_is_refused_with_the_name_that_was_meant(case, old, ne
     ("polynomial", "is a dataset, expected a group"), ("springs", "did you mean /spring?"),
     ("unit_system", "did you mean attribute unit_system of /?"),
     ("contact/stick", "expected there: side_1, side_2, sector_2, mu, gap, gap_harmonic, gap_cosine, "
-                      "gap_sine, area, slider_1, slider_2, normal_load, "
+                      "gap_sine, area, slider_1, slider_2, residual, normal_load, "
                       "gap_rotation, normal_load_rotation, speed_1, speed_2, tangential_stiffness, normal_stiffness, normal_coefficient, normal_exponent, "
                       "reference_force, decay_length, slip_speed, mu_dynamic, weakening_speed, "
                       "weakening_exponent, mu_viscous, iwan_chi, iwan_beta, "

@@ -129,7 +129,7 @@ end module fw_run_toy
     toy.change("src/case/case.f90",
                ("'ringdown']\n   type", "'ringdown', 'toy']\n   type"),
                ("analysis_ringdown\n\n", "analysis_ringdown, analysis_toy\n\n"),
-               ("analysis_ringdown = 10\n", "analysis_ringdown = 10, analysis_toy = 11\n"),
+               ("analysis_ringdown = 11\n", "analysis_ringdown = 11, analysis_toy = 12\n"),
                ("is_integrated=.true.)]",
                 "is_integrated=.true.), &\n"
                 "      analysis_facts(has_points=.false., is_balanced=.false.)]"))

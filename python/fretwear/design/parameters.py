@@ -28,6 +28,8 @@ _KEYS = {
     "contact%mu": "contact/mu", "contact%normal_load": "contact/normal_load",
     "contact%gap": "contact/gap", "contact%tangential_stiffness": "contact/tangential_stiffness",
     "contact%normal_stiffness": "contact/normal_stiffness",
+    "contact%residual": "contact/residual",
+    "contact%slider_1": "contact/slider_1", "contact%slider_2": "contact/slider_2",
     "spring%coefficient": "spring/coefficient", "model%modal_damping": "",
     "model%rayleigh_mass": "", "model%rayleigh_stiffness": "", "model%rotation_speed": "",
     "body%mass": "",

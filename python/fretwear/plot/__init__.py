@@ -8,6 +8,7 @@
 
 from .backbone import plot_backbone
 from .blades import plot_blades, plot_content
+from .bounds import plot_bounds
 from .campaigns import plot_campbell, plot_damping, plot_force, read_damping
 from .campbell import plot_campbell_result
 from .command import add_arguments, main
@@ -37,8 +38,8 @@ from .together import plot_envelope, plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
-           "half_power_damping", "main", "plot_backbone", "plot_blades", "plot_calibration",
-           "plot_campbell", "plot_campbell_result", "plot_content", "plot_convergence",
+           "half_power_damping", "main", "plot_backbone", "plot_blades", "plot_bounds",
+           "plot_calibration", "plot_campbell", "plot_campbell_result", "plot_content", "plot_convergence",
            "plot_cycle", "plot_damper", "plot_damping", "plot_envelope", "plot_flanks",
            "plot_force", "plot_haigh", "plot_harmonics", "plot_hysteresis", "plot_mission",
            "plot_mode", "plot_nodal_diameters", "plot_optimum", "plot_population", "plot_resonance",

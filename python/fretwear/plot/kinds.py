@@ -11,6 +11,7 @@ from ..errors import NotBuiltError
 from ..result import Result
 from .backbone import plot_backbone
 from .blades import plot_blades, plot_content
+from .bounds import plot_bounds
 from .campbell import plot_campbell_result
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
@@ -114,6 +115,8 @@ KINDS: dict[str, Kind] = {
                        lambda r, c: plot_hysteresis(r, c.point, c.pairs)),
     "harmonics": Kind("Harmonics", lambda r: "coefficients" in r and r.n_points > 0,
                       lambda r, c: plot_harmonics(r, c.point, c.observe)),
+    "bounds": Kind("Range over residual tractions", _has("bounds/lowest"),
+                   lambda r, c: plot_bounds(r)),
     "damper": Kind("A body between blades", has_bodies, lambda r, c: plot_damper(r, c.point)),
     "flanks": Kind("Contact on the flanks", _has("contact/position", "contact/fraction"),
                    lambda r, c: plot_flanks(r, c.point)),

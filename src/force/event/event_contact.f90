@@ -35,6 +35,9 @@ module fw_event_contact
       !> instants moves it from (n_pairs).
       logical, allocatable :: rests(:)
       real(wp), allocatable :: drift(:)
+      !> Half of the distance between the ends of the residual traction of pairs that one is given
+      !> for, 0 where none keeps the pair from slipping [force] (n_pairs).
+      real(wp), allocatable :: reach(:)
       !> Whether a normal dof exists (n_pairs).
       logical, allocatable :: has_normal(:)
       !> Coefficients (n_coefficients, 6, n_pairs) of P, P', P'', N, N', N'' and their samples.
@@ -44,6 +47,7 @@ module fw_event_contact
       real(wp), allocatable, private :: out(:, :, :)
    contains
       procedure :: take_friction
+      procedure :: take_shares
       procedure :: evaluate
       procedure :: linearize
       procedure :: coefficients
@@ -73,7 +77,7 @@ contains
       allocate (self%pair(self%n_pairs), self%planar(self%n_pairs))
       allocate (self%closed(self%n_pairs), self%open(self%n_pairs), self%moved(self%n_pairs), &
                 self%rests(self%n_pairs), source=.false.)
-      allocate (self%drift(self%n_pairs), source=0.0_wp)
+      allocate (self%drift(self%n_pairs), self%reach(self%n_pairs), source=0.0_wp)
       self%is_planar = present(1, :) .and. present(2, :)
       self%direction = findloc(present(1:2, :), .true., dim=1)
       self%has_normal = present(3, :)
@@ -108,6 +112,19 @@ contains
          end if
       end do
    end subroutine take_friction
+
+   !> Residual tractions of pairs with one tangential direction, as shares of what balances
+   !> (n_pairs).
+   pure subroutine take_shares(self, shares)
+      class(event_contact_type), intent(inout) :: self
+      real(wp), intent(in) :: shares(:)
+      integer :: i
+
+      self%pair%path%has_share = .true.
+      do i = 1, self%n_pairs
+         self%pair(i)%path%share = shares(i)
+      end do
+   end subroutine take_shares
 
    !> Contact forces and the position at the end of the period.
    subroutine evaluate(self, fourier, prediction, offset, x_start, force, x, mean)
@@ -176,6 +193,7 @@ contains
          self%closed(i) = self%pair(i)%path%closed
          self%open(i) = self%pair(i)%path%open
          self%moved(i) = self%pair(i)%path%moved
+         self%reach(i) = self%pair(i)%path%reach
          call collect(self%pair(i), fourier, self%out(:, :, i))
          force(i, :, :) = 0.0_wp
          ! Where nothing rubs there is no position to move.

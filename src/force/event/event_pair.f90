@@ -32,6 +32,8 @@ module fw_event_pair
       type(moments_type) :: stick, slip, contact, held
       !> Workspace: waves of an angle (0:2 degree), waves at an origin and integrals of one stick.
       real(wp), allocatable, private :: cosines(:), sines(:), origin(:), integral(:)
+      !> Waves by which the z of a pair with a given residual traction follows Q.
+      real(wp), allocatable, private :: across(:)
       !> P' and N' (0:degree, cosine and sine); see set_rates.
       real(wp), allocatable, private :: rate(:, :), normal_rate(:, :)
       !> Of a set that is used for a moment.
@@ -68,6 +70,7 @@ contains
       call self%one%reserve(degree)
       allocate (self%cosines(0:2*degree), self%sines(0:2*degree))
       allocate (self%origin(n_coefficients), self%integral(n_coefficients))
+      allocate (self%across(n_coefficients))
       allocate (self%rate(0:degree, 2), self%normal_rate(0:degree, 2))
    end subroutine reserve
 
@@ -275,6 +278,15 @@ contains
          call integrate_segment(self, j)
          self%integral = 0.0_wp
          call add_means(self%one, 1.0_wp, n_retained, harmonic, column, self%integral)
+         if (self%path%reach > 0.0_wp) then
+            call waves_of_ends(self, n_retained, harmonic, column)
+            do k = 1, size(self%integral)
+               by_tangential(:, k) = by_tangential(:, k) - self%integral(k)*self%origin
+               if (self%presses) by_normal(:, k) = by_normal(:, k) + &
+                                              (self%curves%mu*self%integral(k))*self%across
+            end do
+            cycle
+         end if
          call waves_at(self, self%path%set_at(j), n_retained, harmonic, column)
          do k = 1, size(self%integral)
             by_tangential(:, k) = by_tangential(:, k) - self%integral(k)*self%origin
@@ -312,6 +324,22 @@ contains
          if (harmonic(h) > 0) self%origin(column(h) + 1) = self%sines(harmonic(h))
       end do
    end subroutine waves_at
+
+   !> Of a residual traction that is given: dz/dP in `origin` and dz/dQ in `across`, from the waves
+   !> at the angles of both ends of z, z = (1 - t)/2 (P - Q)(a) + (1 + t)/2 (P + Q)(b).
+   pure subroutine waves_of_ends(self, n_retained, harmonic, column)
+      type(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+
+      associate (path => self%path)
+         call waves_at(self, path%end_at(1), n_retained, harmonic, column)
+         self%across = -0.5_wp*(1.0_wp - path%share)*self%origin
+         call waves_at(self, path%end_at(2), n_retained, harmonic, column)
+         self%across = self%across + 0.5_wp*(1.0_wp + path%share)*self%origin
+         ! (1 - t)/2 of the lower end and (1 + t)/2 of the upper one.
+         self%origin = (1.0_wp + path%share)*self%origin - self%across
+      end associate
+   end subroutine waves_of_ends
 
    !> Contact forces at n_time uniform instants: what collocation and histories take.
    pure subroutine values_at(self, n_time, tangential, normal)
@@ -384,6 +412,13 @@ contains
          case (phase_stick)
             by_tangential(:, k) = waves(:, k)
             if (.not. self%path%set(j)) cycle
+            if (self%path%reach > 0.0_wp) then
+               if (j /= last) call waves_of_ends(self, n_retained, harmonic, column)
+               last = j
+               by_tangential(:, k) = by_tangential(:, k) - self%origin
+               by_normal(:, k) = self%curves%mu*self%across
+               cycle
+            end if
             ! One set of waves serves all instants of a stick.
             if (j /= last) call waves_at(self, self%path%set_at(j), n_retained, harmonic, column)
             last = j

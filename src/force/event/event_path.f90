@@ -46,6 +46,13 @@ module fw_event_path
       real(wp) :: z_end = 0.0_wp
       !> Whether the pair bears throughout, or never; whether z was set at all.
       logical :: closed = .true., open = .false., moved = .false.
+      !> Whether the residual traction is given where the pair can stick throughout, and as which
+      !> share of what balances, -1 to 1.
+      logical :: has_share = .false.
+      real(wp) :: share = 0.0_wp
+      !> Where it does so: half of the distance between the ends of z, else 0 [force], and the
+      !> angles of the lower and the upper one.
+      real(wp) :: reach = 0.0_wp, end_at(2) = 0.0_wp
       !> Breakpoints, what they are, and whether the pair is open behind them.
       integer, private :: n_breaks = 0
       integer, allocatable, private :: kind(:)
@@ -101,6 +108,9 @@ contains
       if (.not. curves%steady) call add_roots(self, curves, at_upper, .true.)
       call finish_breaks(self)
       call evaluate_bounds(self, curves)
+      self%reach = 0.0_wp
+      if (self%has_share .and. self%closed) call hold(self)
+      if (self%reach > 0.0_wp) return
       self%moved = .not. self%closed
       position%z = z_start
       ! A given start outside of the bounds is taken to the nearer of them.
@@ -120,6 +130,29 @@ contains
       self%angle(self%n_segments + 1) = 2.0_wp*pi
       self%z_end = position%z
    end subroutine trace
+
+   !> Stick throughout, where the bounds leave a z: it is between the highest point of the lower
+   !> bound and the lowest of the upper one, which are among the breakpoints.
+   pure subroutine hold(self)
+      class(path_type), intent(inout) :: self
+      type(position_type) :: position
+      integer :: a, b
+
+      a = maxloc(self%lower(:self%n_breaks), dim=1)
+      b = minloc(self%upper(:self%n_breaks), dim=1)
+      if (.not. self%lower(a) < self%upper(b)) return
+      self%reach = 0.5_wp*(self%upper(b) - self%lower(a))
+      self%end_at = [self%break(a), self%break(b)]
+      position%z = 0.5_wp*(1.0_wp - self%share)*self%lower(a) + &
+                   0.5_wp*(1.0_wp + self%share)*self%upper(b)
+      position%set = .true.
+      ! z follows from the inputs: no identity as of pairs that stay where they started.
+      self%moved = .true.
+      self%n_segments = 0
+      call self%append(0.0_wp, phase_stick, position)
+      self%angle(2) = 2.0_wp*pi
+      self%z_end = position%z
+   end subroutine hold
 
    !> Open at a breakpoint: z goes with P. Where the pair lands there, z is P at a root of Q, which
    !> moves by -dQ/Q'.

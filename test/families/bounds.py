@@ -1,0 +1,133 @@
+"""Ranges over residual tractions, against random shares and all corners that a balance of its own
+solves."""
+import itertools
+import subprocess
+
+import h5py
+import numpy as np
+from bodies import RADIUS, SPEED, blades, complex_rows, drawn, model_of, points_of
+from residual_balance import Balance
+
+from fretwear._namelist import write_namelist as namelist_text
+
+TITLE = "Ranges over residual tractions"
+TEXT = """
+Wedges, cylinders and strips between two blades, as of [the bodies](bodies.md), with one to three
+points on each flank; loads reach from pairs that all stick to pairs that lift off. `analysis =
+'bounds'` at one frequency, of the first harmonic of the first blade; 3 harmonics, 64 instants.
+
+The judge has a balance of its own (`test/support/residual_balance.py`), with the places of contact
+and the angles of the case. From the central solution of the result it walks to 200 random shares and
+to all corners, the pairs that slip in the middle among them. No amplitude may lie outside of the
+range by more than 1e-6 of it; what does is walked to once more in 32 steps, so that no jump to
+another branch counts. The central solution has to balance, and both ends to have the amplitudes that
+the result says.
+"""
+COUNT = 100
+SMALL = (0, 1, 2, 4)
+COLUMNS = {"solved": "solved", "refused": "refused", "failed": "ended in words",
+           "wide": "wider than 1 %", "inside": "ends that are no corners", "lost": "shares that the judge did not reach",
+           "centre": "centre off", "ends": "ends off", "outside": "shares outside"}
+ZERO = ("centre", "ends", "outside")
+
+HARMONICS, INSTANTS, SHARES, WITHIN = 3, 64, 200, 1e-6
+
+
+def case_of(seed):
+    case = drawn(seed)
+    places = [p[:3] for p in case["places"]]
+    n = sum(map(len, places))
+    return case | {"wave": False, "compliance": None, "places": places} | {
+        key: case[key][:n] for key in ("mu", "kt", "kn")}
+
+
+def balance_of(case):
+    n = 6 + (case["inertia"] is not None)
+    M, K = np.zeros((2, n, n))
+    M[:4, :4], K[:4, :4] = blades(case)
+    C = case["damping"] * K
+    M[4:6, 4:6] = np.eye(2) * case["pressing"] / RADIUS / SPEED**2
+    if n == 7:
+        M[6, 6] = case["inertia"]
+    load = np.zeros((2 * HARMONICS + 1, n))
+    load[0, 5] = case["pressing"]
+    load[1, :4], load[2, :4] = case["cosine"], case["sine"]
+    rows = []
+    for at, tangent, normal, first, _ in points_of(case):
+        both = np.zeros((2, n))
+        for row, along in zip(both, (tangent, normal)):
+            row[4:6] = along
+            row[first:first + 2] -= along
+            if n == 7:
+                row[6] = at[0] * along[1] - at[1] * along[0]
+        rows.append(both)
+    rows = np.array(rows)
+    return Balance(M, C, K, rows[:, 0], rows[:, 1], case["mu"], case["kt"], case["kn"], load,
+                   INSTANTS)
+
+
+def trial(seed, program, folder):
+    case = case_of(seed)
+    model_of(case).to_hdf5(folder / "model.h5")
+    (folder / "case.nml").write_text(namelist_text({
+        "case": {"analysis": "bounds"},
+        "model": {"source": "hdf5", "file": "model.h5", "rotation_speed": SPEED},
+        "harmonics": {"n_harmonics": HARMONICS, "n_time": INSTANTS, "sampling": "uniform"},
+        "sweep": {"values": [case["omega"]]}, "solver": {"tolerance": 1e-11},
+        "bounds": {"n_starts": 4}}))
+    done = subprocess.run([program, "-q", "case.nml"], cwd=folder, capture_output=True, text=True,
+                          check=False)
+    found = dict.fromkeys(COLUMNS, 0) | {"kind": case["kind"], "notes": []}
+    if done.returncode == 3 and "cannot hold it" in done.stderr:
+        return {**found, "refused": 1}
+    if done.returncode == 4:
+        return {**found, "failed": 1, "notes": [f"not converged: {done.stderr.strip()[-200:]}"]}
+    assert done.returncode == 0, done.stderr
+    with h5py.File(folder / "case.h5") as file:
+        u = np.asarray(file["coefficients"][0])
+        low, high, centre = (float(file[f"bounds/{key}"][0]) for key in ("lowest", "highest",
+                                                                         "centre"))
+        ends = [np.asarray(file[f"bounds/residual_{key}"][0]) for key in ("lowest", "highest")]
+    found["solved"] = 1
+    found["wide"] = int(high > 1.01 * low)
+    found["inside"] = sum(bool(((np.abs(end) < 1.0) & (end != 0.0)).any()) for end in ends)
+    judged(case, u, (low, high, centre), ends, seed, found)
+    return found
+
+
+def judged(case, u, values, ends, seed, found):
+    low, high, centre = values
+    judge, omega = balance_of(case), case["omega"]
+    pairs = len(case["mu"])
+    middle = np.zeros(pairs)
+    own = judge.solve(omega, middle, u)
+    if own is None or abs(amplitude(own) / centre - 1.0) > WITHIN:
+        found["centre"] = 1
+        return
+    for end, value in zip(ends, (low, high)):
+        there = judge.walk(omega, middle, own, end)
+        found["ends"] += there is None or abs(amplitude(there) / value - 1.0) > WITHIN
+    random = np.random.default_rng(1000 + seed)
+    shares = [*random.uniform(-1.0, 1.0, (SHARES, pairs)),
+              *map(np.array, itertools.product((-1.0, 1.0), repeat=pairs))]
+    for share in shares:
+        there = judge.walk(omega, middle, own, share)
+        if there is not None and off(amplitude(there), low, high) > WITHIN:
+            there = own
+            for k in range(32):
+                there = None if there is None else judge.solve(omega, (k + 1) / 32 * share, there)
+        if there is None:
+            found["lost"] += 1
+        elif off(amplitude(there), low, high) > WITHIN:
+            found["outside"] += 1
+            found["notes"].append(f"{amplitude(there):.9e} outside of {low:.9e} {high:.9e}: "
+                                  f"{np.round(share, 3).tolist()}")
+
+
+def amplitude(u):
+    return float(np.abs(complex_rows(u)[1, 0]))
+
+
+def off(value, low, high):
+    """How far outside of the range, beside its end."""
+    return max(1.0 - value / low, value / high - 1.0)
