@@ -208,7 +208,7 @@ def test_what_is_refused(folder: Path, tmp_path: Path, capsys: pytest.CaptureFix
 
     (tmp_path / "short.csv").write_text("\n".join(left[:-1]))
     assert "equal meshes" in refused("--left", str(tmp_path / "short.csv"))
-    assert "Is the axis right" in refused("--axis=-z")
+    assert "is the axis right" in refused("--axis=-z")
     assert "turned by 90 degrees" in refused("--sectors", "4")
     node, *place = left[1].split(",")
     moved = [left[0], ",".join([node, f"{float(place[0]) + 0.1}", *place[1:]]), *left[2:]]

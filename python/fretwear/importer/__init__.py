@@ -5,8 +5,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from .._progress import stages
 from ..errors import InputError, OutputError
@@ -24,15 +27,26 @@ from .build import (
     read_speeds,
     save,
 )
+from .calculix import Job, deck_loads, find_job, supports_of
 from .checks import check_model
+from .deck import Deck, read_deck
 from .finding import Finding
 from .labels import Dofs, read_label_table
 from .matrices import FORMATS, read_matrices
 from .matrix_file import MatrixFile
-from .meshes import ImportedMesh, read_mesh_file
-from .sectors import FRAMES, Interfaces, axis_of, in_sector_frames, read_interfaces
+from .meshes import ImportedMesh, mesh_of_deck, read_mesh_file
+from .sectors import (
+    FRAMES,
+    Interfaces,
+    axis_of,
+    cut_faces,
+    in_sector_frames,
+    pair_faces,
+    read_interfaces,
+)
 from .stress import StressRows, read_stress_points, read_stress_table, stress_of_rows
-from .tables import Pairs, contact_rows, read_loads, read_pairs
+from .tables import Pairs, add_load, contact_rows, read_loads, read_pairs
+from .wheel import PICTURES, draw_wheel, wheel_of
 
 __all__ = ["FORMATS", "Accuracy", "BladeNodes", "Dofs", "Finding", "FullModel", "ImportedMesh",
            "Interfaces", "MatrixFile", "Pairs", "Source", "StressRows", "add_arguments",
@@ -45,10 +59,15 @@ __all__ = ["FORMATS", "Accuracy", "BladeNodes", "Dofs", "Finding", "FullModel", 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the subcommand."""
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE",
-                        help="files searched for mass, stiffness and damping by the usual names")
+                        help="files searched for mass, stiffness and damping by the usual names; "
+                             "of CalculiX the deck or a stored matrix of the job")
     parser.add_argument("-o", "--output", type=Path, metavar="MODEL.h5", help="model file to write")
-    parser.add_argument("--check", action="store_true",
-                        help="read and check, say what is found, write nothing")
+    parser.add_argument("--check", nargs="?", const="", metavar="PICTURE",
+                        help="read and check, say what is found, write no model; of a sector with "
+                             "a mesh the PICTURE (.png, .svg, .pdf; .gif and .html move) shows "
+                             "which way the wave of --engine-order runs")
+    parser.add_argument("--engine-order", type=int, metavar="M",
+                        help="of the picture of --check (default: 1)")
     for role in ROLES:
         parser.add_argument("--" + role.replace("_", "-"), metavar="FILE[#NAME]",
                             type=Source.of, help=f"{role.replace('_', ' ')} matrix")
@@ -65,13 +84,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "format of meshio")
     parser.add_argument("--drop-empty", action="store_true",
                         help="leave out degrees of freedom without mass and stiffness")
+    parser.add_argument("--fix", action="append", default=[], metavar="DOF",
+                        help="hold a degree of freedom, or those of a set (FOOT:3, FOOT for all); "
+                             "repeatable")
     parser.add_argument("--pairs", type=Path, metavar="TABLE", help="contact pairs")
     parser.add_argument("--contact-rows", metavar="FILE[#NAME]", type=Source.of,
                         help="relative displacements t1, t2, n of the pairs, one after the other, "
                              "such as averages over patches")
     parser.add_argument("--loads", type=Path, metavar="TABLE", help="loads by degree of freedom")
+    parser.add_argument("--load", action="append", default=[], metavar="DOF=VALUE",
+                        help="cosine load of a degree of freedom, of each node of a set; "
+                             "repeatable")
     parser.add_argument("--observe", action="append", default=[], metavar="NAME=DOF",
-                        help="observed degree of freedom: number or node:component; repeatable")
+                        help="observed degree of freedom: number, node:component, or the mean of "
+                             "a set of nodes, SET:component; repeatable")
     parser.add_argument("--reduce", type=int, metavar="N_MODES",
                         help="reduce to relative displacements and so many bonded modes")
     parser.add_argument("--accuracy", type=float, metavar="X",
@@ -87,19 +113,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="who factors the stiffness: the first of mumps, cholmod and superlu "
                              "that is installed, or one of them by name (default: auto)")
     parser.add_argument("--sectors", type=int, metavar="N",
-                        help="the model is one of N equal sectors around an axis; needs --left "
-                             "and --right")
+                        help="the model is one of N equal sectors around an axis; its cut faces "
+                             "are found in the mesh, or named by --left and --right")
     for side in ("left", "right"):
-        parser.add_argument(f"--{side}", type=Path, metavar="TABLE",
-                            help=f"nodes of the {side} interface: columns node, x, y, z; the left "
-                                 "ones, turned by a sector, lie on the right ones")
+        parser.add_argument(f"--{side}", metavar="SET|TABLE",
+                            help=f"nodes of the {side} interface: a set of the mesh, or a table "
+                                 "with columns node, x, y, z; the left ones, turned by a sector, "
+                                 "lie on the right ones")
     parser.add_argument("--axis", default="z", metavar="AXIS",
                         help="of the disk, by the right hand from left to right: x, y, z, or -x, "
                              "-y, -z; write --axis=-z (default: z)")
-    parser.add_argument("--frames", choices=FRAMES, default=FRAMES[0],
+    parser.add_argument("--frames", choices=FRAMES,
                         help="of the components of interface nodes, and of all nodes of a mesh; "
                              "Cartesian ones of the right interface are turned (default: "
-                             "cylindrical)")
+                             "cylindrical; of CalculiX cartesian, as it stores them)")
     parser.add_argument("--by-diameter", action="store_true",
                         help="reduce the sector on its own in every nodal diameter, without its "
                              "interfaces")
@@ -128,26 +155,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Import a model as told by the command line; returns the exit status."""
-    if not options.check:
+    picture = _picture(options)
+    if options.check is None:
         if options.output is None:
             raise InputError("nothing to write: give -o MODEL.h5, or --check")
         if not options.output.absolute().parent.is_dir():
             raise OutputError(f"no folder to write {options.output} into")
     chosen_engine(options.factor)   # refused before the work
     model = _read(options)
-    found = [Finding("note", "files", note) for note in model.notes] + check_model(
-        model, options.factor)
+    found = [note if isinstance(note, Finding) else Finding("note", "files", note)
+             for note in model.notes] + check_model(model, options.factor)
     wanted = _modes(options)
     wrong = [finding for finding in found if finding.kind == "error"]
-    if not wrong and options.check and wanted is not None:
+    if not wrong and options.check is not None and wanted is not None:
         # Says what a reduction would refuse.
         model_datasets(model, wanted, options.by_diameter, factor=options.factor)
     for finding in found:
         if finding.kind == "warning" or (finding.kind == "note" and not options.quiet):
-            print(finding, file=sys.stdout if options.check else sys.stderr)
+            print(finding, file=sys.stderr if options.check is None else sys.stdout)
     if wrong:
         raise InputError("\n".join(f"{finding.where}: {finding.text}" for finding in wrong))
-    if options.check:
+    if options.check is not None:
+        if picture is not None:
+            order = 1 if options.engine_order is None else options.engine_order
+            for finding in draw_wheel(wheel_of(model, order), picture):
+                print(finding)
         print(f"no errors in {model.dofs.n} degrees of freedom, "
               f"{0 if model.pairs is None else len(model.pairs)} pairs")
         return 0
@@ -157,6 +189,17 @@ def main(options: argparse.Namespace) -> int:
         if finding.kind == "warning" or not options.quiet:
             print(finding, file=sys.stderr)
     return 0
+
+
+def _picture(options: argparse.Namespace) -> Path | None:
+    """The picture that --check is to draw; what follows it and is none is a file to read."""
+    path = Path(options.check) if options.check else None
+    if path is not None and path.suffix.lower() not in PICTURES:
+        options.files.insert(0, path)
+        path = None
+    if path is None and options.engine_order is not None:
+        raise InputError("--engine-order goes with --check PICTURE (" + ", ".join(PICTURES) + ")")
+    return path
 
 
 def _modes(options: argparse.Namespace) -> int | Accuracy | None:
@@ -187,33 +230,100 @@ def _read(options: argparse.Namespace) -> FullModel:
             raise InputError("--contact-rows needs --pairs: a table with a line for each pair")
         rows = read_rows(options.contact_rows, options.format)
     labels = None if options.labels is None else read_label_table(options.labels)
-    model = gather(sources, options.files, format=options.format, mirror=options.mirror,
+    job = _job(options.files)
+    files = options.files if job is None else [
+        job.dofs, *(path for path in options.files if find_job(path) is None)]
+    model = gather(sources, files, format=options.format, mirror=options.mirror,
                    mass_factor=options.mass_factor, labels=labels)
     model = replace(model, stress=_stress_of_rows(options, model),
                     speeds=read_speeds(options.at_speed, options.format, model, options.mirror))
-    model = drop(model, empty=options.drop_empty)
+    model, deck = _with_mesh(model, options, job)
+    fixed = {abs(dof) for text in options.fix for dof in _fixed(model.dofs, text)} - {0}
+    model = drop(model, empty=options.drop_empty, fixed=fixed)
     model = replace(model, stress=_stress(options, model))
     observe = {}
     for text in options.observe:
         name, equals, dof = text.rpartition("=")
         if not equals or not name:
             raise InputError(f"--observe {text}: expected NAME=DOF")
-        observe[name] = model.dofs.signed(dof, f"--observe {text}")
-        if observe[name] == 0:
+        observe[name] = model.dofs.several(dof, f"--observe {text}")
+        if 0 in observe[name]:
             raise InputError(f"--observe {text}: the ground does not move")
+    places = {} if model.mesh is None else dict(zip(model.mesh.all_nodes.tolist(),
+                                                    model.mesh.all_points))
     model = replace(
         model, observe=observe, title=options.title, unit_system=options.unit_system,
         pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs,
-                                                               rows),
-        loads={} if options.loads is None else read_loads(options.loads, model.dofs),
-        mesh=None if options.mesh is None else read_mesh_file(options.mesh))
+                                                            rows, places))
+    model = _loaded(model, options, deck)
     if options.blade_modes is not None and options.blade is None:
         raise InputError("--blade-modes goes with --blade TABLE")
     if options.blade is not None:
         model = replace(model, blade=read_blade(options.blade, model.dofs,
                                                  5 if options.blade_modes is None
                                                  else options.blade_modes))
-    return _sector(model, options)
+    return _sector(model, options, from_calculix=job is not None)
+
+
+def _job(files: Sequence[Path]) -> Job | None:
+    """The job of CalculiX that files belong to."""
+    jobs = {job.dofs: job for job in map(find_job, files) if job is not None}
+    if len(jobs) > 1:
+        raise InputError("several jobs: " + ", ".join(map(str, jobs)) + "; give the files of one")
+    return next(iter(jobs.values()), None)
+
+
+def _with_mesh(model: FullModel, options: argparse.Namespace,
+               job: Job | None) -> tuple[FullModel, Deck | None]:
+    """The model with its mesh, with the sets and supports of a deck."""
+    deck, mesh = None, None
+    if job is not None and job.deck is not None:
+        deck = read_deck(job.deck)
+    if options.mesh is not None:
+        mesh = read_mesh_file(options.mesh)
+    elif deck is not None and any(len(cells) for _, cells in deck.blocks):
+        mesh = mesh_of_deck(deck)
+    deck = deck or (None if mesh is None else mesh.deck)
+    sets = {**({} if deck is None else deck.node_sets), **({} if mesh is None else mesh.sets)}
+    notes = list(model.notes) + ([] if deck is None else list(deck.notes))
+    held: set[tuple[int, int]] = set()
+    if job is not None and deck is not None:
+        held, dependent = supports_of(deck, model.dofs)
+        if dependent:
+            notes.append(f"{deck.path}: {len(dependent)} displacements have no row and are not "
+                         f"held, {dependent[0][0]}:{dependent[0][1]} for one: they follow others "
+                         "(*EQUATION, *TIE, a support along turned axes) and are shown at rest")
+    return replace(model, mesh=mesh, dofs=model.dofs.with_sets(sets, held), notes=notes), deck
+
+
+def _fixed(dofs: Dofs, text: str) -> list[int]:
+    """Degrees of freedom that --fix names, of a set or node without a component all."""
+    if ":" in text:
+        return dofs.several(text, f"--fix {text}")
+    if text.isdigit():
+        return [dofs.signed(text, f"--fix {text}")]
+    nodes = set(dofs.nodes(text, f"--fix {text}"))
+    return [k for k, (node, _) in enumerate(dofs.labels or (), 1) if node in nodes]
+
+
+def _loaded(model: FullModel, options: argparse.Namespace, deck: Deck | None) -> FullModel:
+    """The model with loads of a table, of the command line, or of the deck of its job."""
+    loads = {} if options.loads is None else read_loads(options.loads, model.dofs)
+    notes = list(model.notes)
+    for text in options.load:
+        dof, _, value = text.rpartition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            dof = ""
+        if not dof:
+            raise InputError(f"--load {text}: expected DOF=VALUE, such as TIP:3=5")
+        add_load(loads.setdefault("cosine", np.zeros(model.dofs.n)), model.dofs, dof, number,
+                 f"--load {text}")
+    if deck is not None and options.loads is None and not options.load:
+        loads, said = deck_loads(deck, model.dofs)
+        notes += said
+    return replace(model, loads=loads, notes=notes)
 
 
 def _stress_of_rows(options: argparse.Namespace, model: FullModel) -> StressRows | None:
@@ -238,20 +348,58 @@ def _stress(options: argparse.Namespace, model: FullModel) -> StressRows | None:
     return read_stress_points(options.stress_points, found)
 
 
-def _sector(model: FullModel, options: argparse.Namespace) -> FullModel:
+def _sector(model: FullModel, options: argparse.Namespace, from_calculix: bool) -> FullModel:
     """The model with the interfaces of a sector, where it is one."""
-    given = [name for name in ("sectors", "left", "right") if getattr(options, name) is not None]
-    if model.blade is not None and len(given) < 3:
-        raise InputError("--blade needs --sectors, --left and --right: blades differ on a disk")
-    if not given:
+    if options.sectors is None:
+        for name in ("left", "right", "blade"):
+            if getattr(options, name) is not None:
+                raise InputError(f"--{name} needs --sectors"
+                                 + (": blades differ on a disk" if name == "blade" else ""))
         if model.pairs is not None and model.pairs.sector_2 is not None:
             raise InputError(f"{options.pairs}: column sector_2 needs --sectors")
         return model
-    if len(given) < 3:
-        raise InputError(f"--{given[0]} needs --sectors, --left and --right")
-    interfaces = read_interfaces(options.sectors, options.left, options.right, model.dofs,
-                                 options.axis)
-    if options.frames == "cartesian":
+    if (options.left is None) != (options.right is None):
+        raise InputError(f"--{'left' if options.right is None else 'right'} needs --"
+                         f"{'right' if options.right is None else 'left'} beside it")
+    if from_calculix and options.frames == "cylindrical":
+        raise InputError("--frames cylindrical: CalculiX stores its matrices along the global "
+                         "axes, also of nodes with *TRANSFORM; leave --frames out")
+    frames = options.frames or ("cartesian" if from_calculix else "cylindrical")
+    left, right, said = cut_faces(options.sectors, options.left, options.right, options.axis,
+                                  model.mesh, _touching(model))
+    interfaces = pair_faces(options.sectors, left, right, model.dofs, options.axis, model.mesh)
+    model = replace(model, notes=[*model.notes, *said])
+    if frames == "cartesian":
         model = in_sector_frames(model, interfaces)
-    return replace(model, interfaces=interfaces, in_cylinder=None if options.frames == "cartesian"
-                   else axis_of(options.axis))
+        model = replace(model, notes=[*model.notes, *_turned(model, interfaces)])
+    return replace(model, interfaces=interfaces, axis=options.axis,
+                   in_cylinder=None if frames == "cartesian" else axis_of(options.axis))
+
+
+def _turned(model: FullModel, interfaces: Interfaces) -> list[Finding]:
+    """Observed quantities and pairs that name nodes of the right face, whose components are along
+    the axes of the next sector."""
+    labels, partner = model.dofs.labels or [], dict(zip(interfaces.right_nodes,
+                                                        interfaces.left_nodes))
+    named = [(f"observed {name}", np.atleast_1d(dofs)) for name, dofs in model.observe.items()]
+    if model.pairs is not None and model.pairs.rows is None:
+        named += [(where, np.concatenate((one, two))) for where, one, two in zip(
+            model.pairs.where, model.pairs.side_1, model.pairs.side_2)]
+    found = []
+    for where, dofs in named:
+        nodes = {labels[abs(int(dof)) - 1][0] for dof in dofs if dof} & set(partner)
+        if nodes:
+            node = min(nodes)
+            found.append(Finding("warning", where, f"node {node} is on the right face, where "
+                                 "components are along the axes of the next sector; node "
+                                 f"{partner[node]} of the left face has those of this one"))
+    return found
+
+
+def _touching(model: FullModel) -> set[int]:
+    """Nodes of pairs between sectors."""
+    pairs, labels = model.pairs, model.dofs.labels
+    if pairs is None or pairs.sector_2 is None or labels is None:
+        return set()
+    sides = np.concatenate((pairs.side_1, pairs.side_2), axis=1)[pairs.sector_2 != 0]
+    return {labels[abs(int(dof)) - 1][0] for dof in sides[sides != 0]}

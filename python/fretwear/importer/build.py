@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -78,14 +78,16 @@ class FullModel:
         Contact pairs.
     loads : dict of str to (n,)
         'static', 'cosine', 'sine', 'static_rotation'.
-    observe : dict of str to int
-        Signed numbers of observed degrees of freedom by name.
+    observe : dict of str to int or list of int
+        Signed numbers of observed degrees of freedom by name; the mean of several.
     title, unit_system : str
         Attributes of the model file.
-    notes : list of str
+    notes : list of str or Finding
         What was done on the way.
     interfaces : Interfaces or None
         Of one sector of a cyclic structure.
+    axis : str
+        About which sector numbers grow, by the right hand: 'x' ... '-z'.
     mesh : ImportedMesh or None
         What the motion is shown on.
     in_cylinder : tuple of float or None
@@ -102,11 +104,12 @@ class FullModel:
     dofs: Dofs
     pairs: Pairs | None = None
     loads: dict[str, Floats] = field(default_factory=dict)
-    observe: dict[str, int] = field(default_factory=dict)
+    observe: Mapping[str, int | Sequence[int]] = field(default_factory=dict)
     title: str = ""
     unit_system: str = ""
-    notes: list[str] = field(default_factory=list)
+    notes: list[str | Finding] = field(default_factory=list)
     interfaces: Interfaces | None = None
+    axis: str = "z"
     mesh: ImportedMesh | None = None
     in_cylinder: tuple[float, float, float] | None = None
     blade: BladeNodes | None = None
@@ -256,13 +259,15 @@ def _align(found: Mapping[str, tuple[sp.csr_array, list[tuple[int, int]] | None]
     return Dofs(n, known), {role: matrix for role, (matrix, _) in found.items()}
 
 
-def drop(model: FullModel, *, empty: bool) -> FullModel:
-    """Leave out held degrees of freedom, and those without mass and stiffness if `empty`.
+def drop(model: FullModel, *, empty: bool, fixed: Collection[int] = ()) -> FullModel:
+    """Leave out held degrees of freedom, those to be `fixed` (from 1), and those without mass and
+    stiffness if `empty`.
 
     A held one is the ground wherever its node is named; plain numbers count what is left.
     """
     stiffness = model.matrices["stiffness"]
     held = stiffness.diagonal() >= HELD
+    held[np.array(sorted(fixed), dtype=np.int64) - 1] = True
     size = abs(stiffness).sum(axis=1) + abs(model.matrices["mass"]).sum(axis=1)
     out = held | ((size == 0.0) if empty else np.zeros(model.dofs.n, dtype=bool))
     if not out.any():
@@ -273,7 +278,8 @@ def drop(model: FullModel, *, empty: bool) -> FullModel:
         model, matrices={role: sp.csr_array(matrix[kept][:, kept])
                          for role, matrix in model.matrices.items()},
         dofs=Dofs(len(kept), None if labels is None else [labels[k] for k in kept],
-                  held=() if labels is None else [labels[k] for k in np.flatnonzero(held)]),
+                  held=model.dofs.held if labels is None else model.dofs.held | {
+                      labels[k] for k in np.flatnonzero(held)}, sets=model.dofs.sets),
         stress=None if model.stress is None else replace(
             model.stress, rows=sp.csr_array(model.stress.rows[:, kept])),
         speeds={speed: sp.csr_array(matrix[kept][:, kept])
@@ -431,10 +437,12 @@ def _condensed(model: FullModel, matrices: dict[str, sp.csr_array], rows: sp.csr
 
 def _observed(model: FullModel) -> sp.csr_array:
     """Rows of the observed degrees of freedom (n_observed, n)."""
-    signed = np.array(list(model.observe.values()), dtype=int)
-    return sp.csr_array((np.sign(signed).astype(float),
-                         (np.arange(len(signed)), np.abs(signed) - 1)),
-                        (len(signed), model.dofs.n))
+    rows = sp.lil_array((len(model.observe), model.dofs.n))
+    for k, chosen in enumerate(model.observe.values()):
+        signed = np.atleast_1d(np.asarray(chosen, dtype=int))
+        for dof in signed.tolist():
+            rows[k, abs(dof) - 1] += np.sign(dof) / len(signed)
+    return sp.csr_array(rows)
 
 
 def _by_diameter(model: FullModel, matrices: dict[str, sp.csr_array],

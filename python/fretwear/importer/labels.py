@@ -1,10 +1,11 @@
-"""Names of degrees of freedom: numbers from 1, or node:component where the file has nodes."""
+"""Names of degrees of freedom: numbers from 1, or node:component where the file has nodes, also by
+the name of a set of nodes."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from ..errors import InputError, OutputError
@@ -16,6 +17,7 @@ Label = tuple[int, int]
 #: Names of the components of a node; 0 is a scalar point.
 COMPONENTS = {"s": 0, "ux": 1, "uy": 2, "uz": 3, "rotx": 4, "roty": 5, "rotz": 6}
 _TOKEN = re.compile(r"([+-]?)(\d+)(?::(\w+))?$")
+_SET = re.compile(r"([+-]?)([^\d+\-:][^:]*):(\w+)$")
 
 
 def component_number(text: str) -> int:
@@ -36,11 +38,14 @@ class Dofs:
         One for each, in order; without them only numbers name a degree of freedom.
     held : set of (node, component), optional
         Labels of degrees of freedom that were left out because they do not move.
+    sets : dict of str to sequence of int, optional
+        Nodes by the name of their set, in capital letters.
     """
 
     def __init__(self, n: int, labels: Sequence[Label] | None = None,
-                 held: Collection[Label] = ()) -> None:
-        self.n, self.held = n, frozenset(held)
+                 held: Collection[Label] = (),
+                 sets: Mapping[str, Sequence[int]] | None = None) -> None:
+        self.n, self.held, self.sets = n, frozenset(held), dict(sets or {})
         self.labels = None if labels is None else [(int(a), int(b)) for a, b in labels]
         self._index = {} if self.labels is None else {
             label: i for i, label in enumerate(self.labels)}
@@ -58,7 +63,8 @@ class Dofs:
         Parameters
         ----------
         token : str
-            '', '0', '12', '-12', '1021:3' or '-1021:uz'.
+            '', '0', '12', '-12', '1021:3' or '-1021:uz'; 'TIP:3' with the name of a set of one
+            node.
         where : str
             Place of the token, for the message.
 
@@ -70,6 +76,11 @@ class Dofs:
         text = token.strip()
         if text in ("", "0"):
             return 0
+        if _SET.match(text):
+            numbers = self.several(text, where)
+            if len(numbers) > 1:
+                raise InputError(f"{where}: {text} names {len(numbers)} nodes; expected one")
+            return numbers[0]
         match = _TOKEN.match(text)
         if not match:
             raise InputError(f"{where}: '{token}' names no degree of freedom; expected a number "
@@ -81,6 +92,37 @@ class Dofs:
                 raise InputError(f"{where}: dof {number} is not there; the matrices have {self.n}")
             return sign * number
         return sign * self._labelled(int(match[2]), match[3], where)
+
+    def several(self, token: str, where: str) -> list[int]:
+        """Signed numbers of the degrees of freedom of a token as `signed` takes it, one for each
+        node of a set."""
+        match = _SET.match(token.strip())
+        if not match:
+            return [self.signed(token, where)]
+        sign, name = -1 if match[1] == "-" else 1, match[2].strip().upper()
+        return [sign * self._labelled(node, match[3], where) for node in self.nodes(name, where)]
+
+    def nodes(self, name: str, where: str) -> list[int]:
+        """Nodes of a set.
+
+        Raises
+        ------
+        InputError
+            There is no such set, or it is empty.
+        """
+        nodes = [int(node) for node in self.sets.get(name.upper(), ())]
+        if not nodes:
+            known = ", ".join(sorted(self.sets))
+            raise InputError(f"{where}: there is no set of nodes {name}; "
+                             + (f"there are {known}" if known else "sets come with a mesh "
+                                "(--mesh) or the deck of a job"))
+        return nodes
+
+    def with_sets(self, sets: Mapping[str, Sequence[int]], held: Collection[Label] = ()) -> Dofs:
+        """The same degrees of freedom with sets of nodes, and further labels that do not move."""
+        known = set(self._index)
+        return Dofs(self.n, self.labels, self.held | {label for label in held
+                                                      if label not in known}, sets)
 
     def _labelled(self, node: int, component: str, where: str) -> int:
         if self.labels is None:

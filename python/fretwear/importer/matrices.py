@@ -10,6 +10,7 @@ matrix_market      many                                         scipy
 harwell_boeing     ANSYS HBMAT and others, RUA and RSA          scipy (symmetric: see `ansys`)
 full               ANSYS .full                                  ansys-mapdl-reader
 abaqus             Abaqus .mtx                                  `abaqus`, no maintained reader
+calculix           CalculiX .sti, .mas, .dof                    `calculix`, no maintained reader
 =================  ===========================================  ==============================
 """
 
@@ -25,6 +26,7 @@ import scipy.sparse as sp
 from ..errors import InputError, OutputError
 from .abaqus import read_mtx
 from .ansys import read_full, read_harwell_boeing
+from .calculix import SUFFIXES, read_stored
 from .matlab import read_mat
 from .matrix_file import MatrixFile
 from .nastran import read_dmig, read_op4
@@ -94,6 +96,8 @@ def _guess(path: Path, start: bytes) -> str:
         return "abaqus"
     if ending == ".full":
         return "full"
+    if ending in SUFFIXES:
+        return "calculix"
     if _is_harwell_boeing(start):
         return "harwell_boeing"
     raise InputError(f"{path}: the format is not recognized; say which with --format: "
@@ -119,4 +123,5 @@ FORMATS: dict[str, Callable[[Path], MatrixFile]] = {
     "harwell_boeing": read_harwell_boeing,
     "full": read_full,
     "abaqus": read_mtx,
+    "calculix": read_stored,
 }

@@ -1,14 +1,15 @@
-"""Meshes of other programs: read by meshio (ANSYS archives by mapdl-archive), with the numbers of
-their nodes, which tie them to the rows of the matrices.
+"""Meshes of other programs: decks of Abaqus and CalculiX by this package, ANSYS archives by
+mapdl-archive, all others by meshio, with the numbers of their nodes, which tie them to the rows of
+the matrices, and their sets of nodes.
 
-meshio forgets the numbers of Abaqus and Nastran files. They are read here once more, together with
-the positions, which have to be those of meshio in the same order.
+meshio forgets the numbers of Nastran files. They are read here once more, together with the
+positions, which have to be those of meshio in the same order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,15 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, OutputError
 from ..mesh import CELL_TYPES
+from .deck import EDGES, Deck, read_deck
 from .matrix_file import need
 
-__all__ = ["ImportedMesh", "read_mesh_file"]
+__all__ = ["ImportedMesh", "mesh_of_deck", "read_mesh_file"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+#: Positions and numbers of nodes, cells, sets of nodes.
+_Read = tuple[Floats, Ints, "list[tuple[str, Ints]]", "dict[str, list[int]]"]
 
 #: Where other formats keep the numbers of nodes, in the point data of meshio.
 _NUMBERS = ("node", "node_id", "GlobalNodeId", "ansys_node_num", "gmsh:node_id")
@@ -52,6 +56,12 @@ class ImportedMesh:
         What was left out.
     all_points, all_nodes : (n_all, 3), (n_all,) int
         Positions and numbers of all nodes of the file, those in the middle of edges too.
+    middles : (n_edges, 3) int
+        Numbers of both corners of each edge and of the node in its middle.
+    sets : dict of str to list of int
+        Numbers of nodes by the name of their set, in capital letters.
+    deck : Deck or None
+        All that is read of a deck.
     """
 
     path: Path
@@ -63,6 +73,9 @@ class ImportedMesh:
     notes: list[str]
     all_points: Floats
     all_nodes: Ints
+    middles: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    sets: dict[str, list[int]] = field(default_factory=dict)
+    deck: Deck | None = None
 
 
 def read_mesh_file(path: str | Path) -> ImportedMesh:
@@ -78,11 +91,19 @@ def read_mesh_file(path: str | Path) -> ImportedMesh:
     path = Path(path)
     if not path.is_file():
         raise OutputError(f"{path}: cannot be read: there is no such file")
+    if path.suffix.lower() == ".inp":
+        return mesh_of_deck(read_deck(path))
     if path.suffix.lower() in (".cdb", ".dat") and _is_ansys(path):
-        points, nodes, blocks = _read_ansys(path)
+        points, nodes, blocks, sets = _read_ansys(path)
     else:
-        points, nodes, blocks = _read_meshio(path)
-    return _linear(path, points, nodes, blocks)
+        points, nodes, blocks, sets = _read_meshio(path)
+    return replace(_linear(path, points, nodes, blocks), sets=sets)
+
+
+def mesh_of_deck(deck: Deck) -> ImportedMesh:
+    """The mesh of a deck, with its sets of nodes."""
+    return replace(_linear(deck.path, deck.points, deck.nodes, deck.blocks), deck=deck,
+                   sets=deck.node_sets)
 
 
 def _is_ansys(path: Path) -> bool:
@@ -90,20 +111,25 @@ def _is_ansys(path: Path) -> bool:
         return any("NBLOCK" in line.upper() for _, line in zip(range(5000), file))
 
 
-def _read_ansys(path: Path) -> tuple[Floats, Ints, list[tuple[str, Ints]]]:
+def _read_ansys(path: Path) -> _Read:
     archive = need("mapdl_archive", "mapdl-archive", "reading ANSYS archives", "ansys")
     vtk = need("pyvista", "pyvista", "reading ANSYS archives", "ansys")
-    grid = archive.Archive(str(path)).grid
+    read = archive.Archive(str(path))
+    grid = read.grid
     blocks = []
     for kind, cells in grid.cells_dict.items():
         # QUADRATIC_TETRA and so on: corners come first.
         name = vtk.CellType(kind).name.lower().rsplit("_")[-1]
-        blocks.append((name, np.asarray(cells, dtype=np.int64)))
+        table = np.asarray(cells, dtype=np.int64)
+        whole = f"{name}{table.shape[-1]}"
+        blocks.append((whole if whole in EDGES else name, table))
+    sets = {str(name).upper(): np.asarray(nodes).astype(int).tolist()
+            for name, nodes in read.node_components.items()}
     return (np.asarray(grid.points, dtype=float),
-            np.asarray(grid.point_data["ansys_node_num"], dtype=np.int64), blocks)
+            np.asarray(grid.point_data["ansys_node_num"], dtype=np.int64), blocks, sets)
 
 
-def _read_meshio(path: Path) -> tuple[Floats, Ints, list[tuple[str, Ints]]]:
+def _read_meshio(path: Path) -> _Read:
     meshio = need("meshio", "meshio", "reading meshes", "export")
     try:
         mesh = meshio.read(path)
@@ -117,32 +143,32 @@ def _read_meshio(path: Path) -> tuple[Floats, Ints, list[tuple[str, Ints]]]:
     blocks = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
     found = next((mesh.point_data[name] for name in _NUMBERS if name in mesh.point_data), None)
     if found is not None:
-        return points, np.asarray(found).astype(np.int64).ravel(), blocks
-    listed = {".inp": _abaqus_nodes, ".bdf": _nastran_nodes, ".nas": _nastran_nodes,
-              ".fem": _nastran_nodes, ".dat": _nastran_nodes}.get(path.suffix.lower())
-    if listed is None:
-        return points, np.arange(1, len(points) + 1), blocks
-    table = np.array(list(listed(path)), dtype=float).reshape(-1, 4)
+        nodes = np.asarray(found).astype(np.int64).ravel()
+        return points, nodes, blocks, _sets(mesh, nodes)
+    if path.suffix.lower() not in (".bdf", ".nas", ".fem", ".dat"):
+        nodes = np.arange(1, len(points) + 1)
+        return points, nodes, blocks, _sets(mesh, nodes)
+    table = np.array(list(_nastran_nodes(path)), dtype=float).reshape(-1, 4)
     if len(table) != len(points) or (np.abs(table[:, 1:] - points).max(initial=0.0)
                                      > _SAME * np.abs(points).max(initial=1.0)):
         raise InputError(f"{path}: {len(table)} nodes are listed in it, but meshio finds "
                          f"{len(points)} or others; write the mesh as one file with nodes in "
                          "global coordinates, without INCLUDE and generated nodes")
-    return points, table[:, 0].astype(np.int64), blocks
+    nodes = table[:, 0].astype(np.int64)
+    return points, nodes, blocks, _sets(mesh, nodes)
 
 
-def _abaqus_nodes(path: Path) -> Iterator[list[float]]:
-    """Number and position of the nodes below *NODE."""
-    inside = False
-    with open(path) as file:
-        for line in file:
-            if line.startswith("**") or not line.strip():
-                continue
-            if line.startswith("*"):
-                inside = line.split(",")[0].strip().upper() == "*NODE"
-            elif inside:
-                words = [float(word) for word in line.strip().rstrip(",").split(",")[:4]]
-                yield words + [0.0] * (4 - len(words))
+def _sets(mesh: Any, nodes: Ints) -> dict[str, list[int]]:
+    """Sets of nodes, and the nodes of sets of cells, as meshio finds them."""
+    found = {}
+    for name, parts in mesh.cell_sets.items():
+        inside = [np.asarray(block.data)[np.asarray(part, dtype=np.int64)].ravel()
+                  for block, part in zip(mesh.cells, parts) if part is not None and len(part)]
+        if inside and ":" not in name:
+            found[name.upper()] = nodes[np.unique(np.concatenate(inside)).astype(int)].tolist()
+    for name, members in mesh.point_sets.items():
+        found[name.upper()] = nodes[np.asarray(members, dtype=np.int64)].tolist()
+    return found
 
 
 def _nastran_nodes(path: Path) -> Iterator[list[float]]:
@@ -160,7 +186,7 @@ def _nastran_nodes(path: Path) -> Iterator[list[float]]:
 def _linear(path: Path, points: Floats, nodes: Ints,
             blocks: list[tuple[str, Ints]]) -> ImportedMesh:
     """Cells by their corners; nodes that are no corner are left out."""
-    cells, kinds, left_out = [], [], 0
+    cells, kinds, edges, left_out = [], [], [np.zeros((0, 3), dtype=np.int64)], 0
     for name, corners in blocks:
         linear = name.rstrip("0123456789")
         if linear not in CELL_TYPES:
@@ -170,6 +196,9 @@ def _linear(path: Path, points: Floats, nodes: Ints,
         if corners.ndim != 2 or corners.shape[1] < n:
             raise InputError(f"{path}: meshio finds cells of type {name} with "
                              f"{corners.shape[-1]} nodes, which have {n} corners")
+        if name in EDGES and corners.shape[1] == n + len(EDGES[name]):
+            edges += [np.column_stack((corners[:, edge], corners[:, n + k]))
+                      for k, edge in enumerate(EDGES[name])]
         padded = np.full((len(corners), 8), -1, dtype=np.int64)
         padded[:, :n] = corners[:, :n]
         cells.append(padded)
@@ -190,7 +219,8 @@ def _linear(path: Path, points: Floats, nodes: Ints,
         raise InputError(f"{path}: names a node twice")
     renumbered = place[every]
     return ImportedMesh(path, points[used], nodes[used], renumbered, kind,
-                        _bodies(renumbered, len(used)), notes, points, nodes)
+                        _bodies(renumbered, len(used)), notes, points, nodes,
+                        np.unique(nodes[np.concatenate(edges)], axis=0))
 
 
 def _bodies(cells: Ints, n_points: int) -> Ints:

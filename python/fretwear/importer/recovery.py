@@ -26,7 +26,7 @@ from .tables import side_rows
 if TYPE_CHECKING:
     from .build import FullModel
 
-__all__ = ["check_mesh", "recovery_mesh"]
+__all__ = ["check_mesh", "point_motion", "recovery_mesh", "surface_faces"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,7 +60,7 @@ def recovery_mesh(model: FullModel, reduction: Reduction | None) -> RecoveryMesh
         Gives the displacement by each coordinate; None: the coordinates are those of the matrices.
     """
     mesh = _mesh(model)
-    spread = _spread(model, mesh)
+    spread = point_motion(model, mesh)
     motion = (np.asarray(spread.toarray(), dtype=np.float32) if reduction is None
               else reduction.row(spread, np.float32))
     facets, pair, points, average = _facets(model, mesh)
@@ -115,7 +115,7 @@ def _mesh(model: FullModel) -> ImportedMesh:
     return model.mesh
 
 
-def _spread(model: FullModel, mesh: ImportedMesh) -> sp.csr_array:
+def point_motion(model: FullModel, mesh: ImportedMesh) -> sp.csr_array:
     """Global displacement of the points (3 n_points, n) by the degrees of freedom of the matrices,
     each in the frame of its node."""
     order = np.argsort(mesh.nodes)
@@ -166,7 +166,7 @@ def _strained(model: FullModel, mesh: ImportedMesh) -> float | None:
     motions[:, :, :3] = np.eye(3)
     for k in range(3):
         motions[:, :, 3 + k] = np.cross(np.eye(3)[k], points) / size
-    spread = _spread(model, mesh)
+    spread = point_motion(model, mesh)
     rigid = np.asarray(spread.T @ motions.reshape(-1, 6))
     labels = np.array(model.dofs.labels)
     frames = dict(zip(mesh.nodes.tolist(), _frames(model, mesh)))
@@ -222,7 +222,7 @@ def _facets(model: FullModel, mesh: ImportedMesh) -> tuple[Ints, Ints, Floats, A
         return *none, mesh.points, sp.csr_array((0, len(mesh.points)))
     chosen: list[tuple[tuple[int, ...], int]] = []
     alone: list[tuple[tuple[int, ...], int]] = []
-    for face in _surface(mesh):
+    for face in surface_faces(mesh):
         touching = [k for k, corner in enumerate(face) if pair_of[corner] >= 0]
         (chosen if len(touching) == len(face) else alone).extend((face, k) for k in touching)
     # Pairs without a face of their own: around their nodes, whatever else is there.
@@ -257,7 +257,7 @@ def _pairs_of_points(model: FullModel, mesh: ImportedMesh) -> Ints:
     pair, direction = np.nonzero(number)
     gather = sp.csr_array((np.ones(len(pair)), (pair, number[pair, direction] - 1)),
                           (len(number), rows.shape[0]))
-    spread = abs(_spread(model, mesh))
+    spread = abs(point_motion(model, mesh))
     points = sp.csr_array((np.ones(spread.shape[0]), (np.arange(spread.shape[0]) // 3,
                                                       np.arange(spread.shape[0]))))
     weight = sp.csr_array(points @ spread @ (gather @ rows).T)
@@ -266,7 +266,7 @@ def _pairs_of_points(model: FullModel, mesh: ImportedMesh) -> Ints:
     return found
 
 
-def _surface(mesh: ImportedMesh) -> list[tuple[int, ...]]:
+def surface_faces(mesh: ImportedMesh) -> list[tuple[int, ...]]:
     """Faces that belong to one cell, and shells."""
     count: dict[tuple[int, ...], tuple[int, ...] | None] = {}
     for cell, kind in zip(mesh.cells.tolist(), mesh.kind.tolist()):

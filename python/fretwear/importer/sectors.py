@@ -7,7 +7,7 @@ right interface are turned here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,22 +17,32 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .cuts import (
+    Face,
+    faces_by_turning,
+    fits,
+    left_behind,
+    match,
+    named_face,
+    rotation,
+    table_face,
+)
 from .finding import Finding
 from .labels import Dofs
+from .meshes import ImportedMesh
 from .spectrum import Spectrum, lowest_modes
-from .tables import read_table
 
 if TYPE_CHECKING:
     from .build import FullModel
 
-__all__ = ["FRAMES", "Interfaces", "axis_of", "check_interfaces", "in_sector_frames",
-           "read_interfaces", "tie", "tied_spectrum"]
+__all__ = ["FRAMES", "Interfaces", "axis_of", "check_interfaces", "cut_faces",
+           "in_sector_frames", "pair_faces", "read_interfaces", "tie", "tied_spectrum"]
 
 Floats = NDArray[np.float64]
 
 FRAMES = ("cylindrical", "cartesian")
-#: Turned nodes lie on each other within this share of the distance between neighbours.
-_MATCH = 1e-3
+#: Of a rotation from an orthogonal matrix.
+_TURNS = 1e-9
 #: Rigid motions of a free body, and those that all sectors of a free disk make alike: along the
 #: axis and around it.
 _FREE, _ALIKE = 6, 2
@@ -74,54 +84,103 @@ def read_interfaces(n_sectors: int, left: Path, right: Path, dofs: Dofs,
     InputError
         Counts, places or components of the nodes do not agree; the message says where.
     """
-    if n_sectors < 2:
-        raise InputError(f"--sectors {n_sectors}: must be at least 2")
+    return pair_faces(n_sectors, table_face(left), table_face(right), dofs, axis)
+
+
+def pair_faces(n_sectors: int, left: Face, right: Face, dofs: Dofs, axis: str = "z",
+               mesh: ImportedMesh | None = None) -> Interfaces:
+    """Pair the nodes of both cut faces by turning the left ones by one sector, `mesh` tells nodes
+    at one place apart.
+
+    Raises
+    ------
+    InputError
+        Counts, places or components of the nodes do not agree; the message says where.
+    """
+    check_sectors(n_sectors)
     if dofs.labels is None:
         raise InputError("--left and --right name nodes, but the files name none; give a label "
                          "table (--labels)")
-    (one, places), (two, others) = _nodes(left), _nodes(right)
-    if len(one) != len(two):
-        raise InputError(f"{left} has {len(one)} nodes and {right} {len(two)}: the interfaces "
-                         "need equal meshes")
-    turn = _rotation(axis, 2.0 * np.pi / n_sectors)
-    gaps = np.linalg.norm((places @ turn.T)[:, None] - others[None], axis=2)
-    partner = gaps.argmin(axis=1)
-    distance = gaps[np.arange(len(one)), partner]
-    between = np.linalg.norm(places[:, None] - places[None], axis=2)
-    near = between[between > 0.0].min() if (between > 0.0).any() else np.abs(places).max()
-    worst = int(distance.argmax())
-    if distance[worst] > _MATCH * near:
-        raise InputError(
-            f"node {one[worst]} of {left}, turned by {360.0 / n_sectors:g} degrees about {axis}, "
-            f"is {distance[worst]:.3g} from the nearest of {right}, node {two[partner[worst]]}; "
-            f"expected below {_MATCH * near:.2g}. Is the axis right (--axis=-z turns the other "
-            "way), or left the right one?")
-    if len(set(partner.tolist())) < len(partner):
-        raise InputError(f"two nodes of {left} lie on one of {right}: the interfaces need equal "
-                         "meshes")
-    pairs = [(node, two[k]) for node, k in zip(one, partner)]
-    numbers = np.array([both for node, other in pairs for both in _components(dofs, node, other)],
+    turn = rotation(axis, 2.0 * np.pi / n_sectors)
+    partner, distance = match(left, right, turn, n_sectors, axis, mesh)
+    pairs = [(node, right.nodes[k]) for node, k in zip(left.nodes, partner.tolist())]
+    own: dict[int, dict[int, int]] = {}
+    for i, (node, component) in enumerate(dofs.labels):
+        own.setdefault(node, {})[component] = i + 1
+    numbers = np.array([both for one, other in pairs for both in _components(dofs, own, one,
+                                                                             other)],
                        dtype=np.int32).reshape(-1, 2)
-    return Interfaces(n_sectors, numbers[:, 0], numbers[:, 1], one, [b for _, b in pairs],
+    return Interfaces(n_sectors, numbers[:, 0], numbers[:, 1], left.nodes, [b for _, b in pairs],
                       float(distance.max()), turn)
+
+
+def cut_faces(n_sectors: int, left: str | None, right: str | None, axis: str,
+              mesh: ImportedMesh | None,
+              leave: Collection[int] = ()) -> tuple[Face, Face, list[Finding]]:
+    """Both cut faces: of tables, of sets of the mesh in either order, or found by turning it.
+
+    Parameters
+    ----------
+    left, right : str or None
+        File of a table, or name of a set.
+    leave : collection of int
+        Nodes that touch those of other sectors and are not tied.
+    """
+    check_sectors(n_sectors)
+    if left is None or right is None:
+        if mesh is None:
+            raise InputError("--sectors needs --left and --right, tables or sets of nodes of the "
+                             "cut faces, or a mesh (--mesh) in which they are found by turning it")
+        return faces_by_turning(mesh, n_sectors, axis, leave)
+    turn = rotation(axis, 2.0 * np.pi / n_sectors)
+    found: list[Finding] = []
+    faces, named = [], 0
+    for option, text in (("--left", left), ("--right", right)):
+        if mesh is not None and text.upper() in mesh.sets and not Path(text).is_file():
+            face, notes = named_face(text, mesh)
+            named, found = named + 1, found + notes
+        elif mesh is not None and not Path(text).is_file():
+            raise InputError(f"{option} {text}: there is no such file, and no set of nodes of this "
+                             "name: there are " + (", ".join(sorted(mesh.sets)) or "none"))
+        else:
+            face = table_face(Path(text))
+        faces.append(face)
+    one, two = faces
+    if named == 2 and not fits(one, two, turn, mesh) and fits(two, one, turn, mesh):
+        one, two = two, one
+        found.append(Finding("note", "interfaces", f"{one.name}, turned by a sector about {axis}, "
+                             f"lies on {two.name}: it is the left face"))
+    if mesh is not None and named == 2:
+        behind = left_behind(mesh, one, turn, leave)
+        found += [] if behind is None else [behind]
+    return one, two, found
+
+
+def check_sectors(n_sectors: int) -> None:
+    """Refuse what makes no disk."""
+    if n_sectors < 2:
+        raise InputError(f"--sectors {n_sectors}: must be at least 2")
 
 
 def in_sector_frames(model: FullModel, interfaces: Interfaces) -> FullModel:
     """The model with Cartesian components of right interface nodes in the frame of the next
     sector."""
     index = {label: i for i, label in enumerate(model.dofs.labels or ())}
-    rotation = sp.lil_array(sp.identity(model.dofs.n, format="lil"))
+    turned = sp.lil_array(sp.identity(model.dofs.n, format="lil"))
     for node in interfaces.right_nodes:
         for first in (1, 4):
             places = [index.get((node, first + c), -1) for c in range(3)]
-            there = [p for p in places if p >= 0]
-            if len(there) not in (0, 3):
-                raise InputError(f"node {node} has not all components {first} to {first + 2}: it "
-                                 "cannot be turned; use cylindrical nodal systems")
+            there = [c for c in range(3) if places[c] >= 0]
+            part = interfaces.turn[np.ix_(there, there)]
+            # Held along the axis alone is held along the axis in every sector.
+            if np.abs(part @ part.T - np.eye(len(there))).max(initial=0.0) > _TURNS:
+                raise InputError(f"node {node} has not all components {first} to {first + 2}, of "
+                                 f"those across the axis: it cannot be turned; use cylindrical "
+                                 "nodal systems")
             for row, p in enumerate(there):
-                for column, q in enumerate(there):
-                    rotation[p, q] = interfaces.turn[row, column]
-    q = sp.csr_array(rotation)
+                for column, c in enumerate(there):
+                    turned[places[p], places[c]] = part[row, column]
+    q = sp.csr_array(turned)
     return replace(
         model, matrices={role: sp.csr_array(q.T @ matrix @ q)
                          for role, matrix in model.matrices.items()},
@@ -173,23 +232,10 @@ def check_interfaces(interfaces: Interfaces, alone: Spectrum, tied: Spectrum) ->
                       "of nodal diameter 0")
 
 
-def _nodes(path: Path) -> tuple[list[int], Floats]:
-    """Nodes and their places (n, 3) of a table."""
-    table = read_table(path, ["node", "x", "y", "z"])
-    numbers, places = table.numbers("node"), table.vectors(["x", "y", "z"])
-    if numbers is None or places is None:
-        raise InputError(f"{path}: expected the columns node, x, y, z")
-    nodes = numbers.astype(int).tolist()
-    if len(set(nodes)) < len(nodes):
-        raise InputError(f"{path}: names a node twice")
-    return nodes, places
-
-
-def _components(dofs: Dofs, left: int, right: int) -> list[tuple[int, int]]:
+def _components(dofs: Dofs, own: Mapping[int, dict[int, int]], left: int,
+                right: int) -> list[tuple[int, int]]:
     """Degrees of freedom (from 1) of two nodes, component by component."""
-    labels = dofs.labels or []
-    places = [{c: i + 1 for i, (node, c) in enumerate(labels) if node == wanted}
-              for wanted in (left, right)]
+    places = [own.get(node, {}) for node in (left, right)]
     if not places[0] and not places[1]:
         # Held nodes are no part of the matrices.
         held = {node for node, _ in dofs.held}
@@ -207,15 +253,3 @@ def axis_of(axis: str) -> tuple[float, float, float]:
     sign = -1.0 if axis.startswith("-") else 1.0
     x, y, z = (sign * float(name == axis[-1]) for name in "xyz")
     return x, y, z
-
-
-def _rotation(axis: str, angle: float) -> Floats:
-    """Rotation (3, 3) about x, y or z by the right hand, with a minus the other way."""
-    sign, name = (-1.0, axis[1:]) if axis.startswith("-") else (1.0, axis)
-    if name not in ("x", "y", "z"):
-        raise InputError(f"--axis {axis}: must be x, y, z, -x, -y or -z")
-    j, k = ("xyz".index(name) + 1) % 3, ("xyz".index(name) + 2) % 3
-    found = np.eye(3)
-    c, s = np.cos(angle), sign * np.sin(angle)
-    found[j, j], found[j, k], found[k, j], found[k, k] = c, -s, s, c
-    return found

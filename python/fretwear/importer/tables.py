@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ..errors import InputError, OutputError
 from .labels import Dofs
 
-__all__ = ["LOADS", "Pairs", "contact_rows", "read_loads", "read_pairs", "read_table", "side_rows"]
+__all__ = ["LOADS", "Pairs", "add_load", "contact_rows", "read_loads", "read_pairs", "read_table",
+           "side_rows"]
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +29,8 @@ _NODES = ["node_1", "node_2"]
 _NORMAL, _TANGENT = ["nx", "ny", "nz"], ["t1x", "t1y", "t1z"]
 _POSITION = ["x", "y", "z"]
 _VALUES = ["mu", "gap", "area"]
+#: Nodes at one place are within this share of the size of their set.
+_TOUCH = 1e-4
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,8 @@ class _Table:
         return np.column_stack([column for column in columns if column is not None])
 
 
-def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None) -> Pairs:
+def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None,
+               places: Mapping[int, Floats] | None = None) -> Pairs:
     """Read contact pairs.
 
     Parameters
@@ -113,12 +118,16 @@ def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None) -
         freedom (numbers, node:component, empty or 0 for none), or node_1, node_2 (0 for the
         ground) with the normal nx, ny, nz from side 2 to side 1 and, if wanted, the first
         tangent t1x, t1y, t1z. Then any of mu, gap, area, x, y, z, patch, and of
-        sectors sector_2. Lines that start with # are comments.
+        sectors sector_2. Lines that start with # are comments. The name of a set in place of a
+        node makes a pair of each of its nodes; sets on both sides have their nodes at the same
+        places.
     dofs : Dofs
         Degrees of freedom of the matrices.
     rows : (3 n_pairs, n) sparse array, optional
         Relative displacements t1, t2, n of one pair after the other, such as averages over
         patches; the table then names no sides.
+    places : mapping of int to (3,), optional
+        Positions of nodes, by which sets on both sides are matched.
 
     Raises
     ------
@@ -127,6 +136,8 @@ def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None) -
     """
     table = read_table(Path(path), [*_SIDES, *_NODES, *_NORMAL, *_TANGENT, *_POSITION, *_VALUES,
                                     "patch", "sector_2"])
+    if rows is None:
+        table = _expanded(table, dofs, places or {})
     if rows is not None:
         side_1 = _numbers_of_rows(table, dofs, rows)
         side_2 = np.zeros_like(side_1)
@@ -193,11 +204,16 @@ def read_loads(path: str | Path, dofs: Dofs) -> dict[str, Floats]:
         assert values is not None
         loads[name] = np.zeros(dofs.n)
         for line, where, value in zip(table.lines, table.where, values):
-            dof = dofs.signed(line["dof"], f"{where}, column dof")
-            if dof == 0:
-                raise InputError(f"{where}, column dof: a load needs a degree of freedom")
-            loads[name][abs(dof) - 1] += math.copysign(1.0, dof) * value
+            add_load(loads[name], dofs, line["dof"], value, f"{where}, column dof")
     return loads
+
+
+def add_load(load: Floats, dofs: Dofs, token: str, value: float, where: str) -> None:
+    """Add a force at a degree of freedom, or at each node of a set."""
+    for dof in dofs.several(token, where):
+        if dof == 0:
+            raise InputError(f"{where}: a load needs a degree of freedom")
+        load[abs(dof) - 1] += math.copysign(1.0, dof) * value
 
 
 def read_table(path: Path, known: Sequence[str]) -> _Table:
@@ -228,6 +244,66 @@ def read_table(path: Path, known: Sequence[str]) -> _Table:
                              "per column")
         lines.append({name: value.strip() for name, value in zip(columns, row)})
     return _Table(path, columns, lines, where)
+
+
+def _expanded(table: _Table, dofs: Dofs, places: Mapping[int, Floats]) -> _Table:
+    """The table with a line for each node of the sets that a line names."""
+    lines, where = [], []
+    for line, at in zip(table.lines, table.where):
+        named: list[dict[str, str]] = [{}, {}]
+        for side in (1, 2):
+            for column in (f"node_{side}", *(f"side_{side}_{c}" for c in DIRECTIONS)):
+                word = line.get(column, "").lstrip("+-").partition(":")[0].strip()
+                if word and not word.isdigit():
+                    named[side - 1][column] = word
+        sets = [list(dict.fromkeys(word.upper() for word in side.values())) for side in named]
+        if not sets[0] and not sets[1]:
+            lines.append(line)
+            where.append(at)
+            continue
+        if max(map(len, sets)) > 1:
+            several = sets[0] if len(sets[0]) > 1 else sets[1]
+            raise InputError(f"{at}: names the sets {', '.join(several)} on one side; expected "
+                             "one")
+        nodes = [dofs.nodes(words[0], at) if words else [] for words in sets]
+        if nodes[0] and nodes[1]:
+            nodes[1] = _opposite(nodes, [words[0] for words in sets], places, at)
+        for side, words in enumerate(sets):
+            other = [line.get(column, "").strip() for column in (
+                f"node_{side + 1}", *(f"side_{side + 1}_{c}" for c in DIRECTIONS))]
+            if not words and len(nodes[1 - side]) > 1 and any(
+                    word not in ("", "0") for word in other):
+                raise InputError(f"{at}: {len(nodes[1 - side])} nodes of {sets[1 - side][0]} "
+                                 "against one: name a set on either side, or the ground on one")
+        for k in range(max(map(len, nodes))):
+            own = dict(line)
+            for side, columns in enumerate(named):
+                for column, word in columns.items():
+                    own[column] = line[column].replace(word, str(nodes[side][k]), 1)
+            lines.append(own)
+            where.append(f"{at}, node {(nodes[0] or nodes[1])[k]}")
+    return _Table(table.path, table.columns, lines, where)
+
+
+def _opposite(nodes: Sequence[Sequence[int]], names: Sequence[str],
+              places: Mapping[int, Floats], where: str) -> list[int]:
+    """Node of the second set at the place of each of the first."""
+    missing = next((node for side in nodes for node in side if node not in places), None)
+    if missing is not None:
+        raise InputError(f"{where}: node {missing} has no place in the mesh, by which the sets "
+                         f"{names[0]} and {names[1]} are matched")
+    one, two = (np.array([places[node] for node in side]) for side in nodes)
+    distance, partner = cKDTree(two).query(one)
+    size = float(np.ptp(one, axis=0).max()) or 1.0
+    worst = int(distance.argmax())
+    if distance[worst] > _TOUCH * size:
+        raise InputError(f"{where}: node {nodes[0][worst]} of {names[0]} is {distance[worst]:.3g} "
+                         f"from the nearest of {names[1]}; sets on both sides have their nodes at "
+                         "the same places")
+    if len(one) != len(two) or len(set(partner.tolist())) < len(partner):
+        raise InputError(f"{where}: {names[0]} has {len(one)} nodes and {names[1]} {len(two)}, "
+                         "which do not match one by one")
+    return [nodes[1][k] for k in partner.tolist()]
 
 
 def _sides(table: _Table, dofs: Dofs, side: int) -> NDArray[np.int32]:
