@@ -35,6 +35,8 @@ fretwear.study
     Parameter studies.
 fretwear.sector
     Generator of the reduced bladed-disk sector with a dovetail root.
+fretwear.beam
+    Generator of the Brake-Reuss beam, two half beams with a bolted lap joint.
 fretwear.plot
     Pictures of results, as matplotlib figures.
 fretwear.compare, fretwear.report, fretwear.export

@@ -36,7 +36,9 @@ def read_mesh(path: Path) -> RecoveryMesh:
             if "mesh" in file:
                 return mesh_of_group(file["mesh"], path, n_dof)
             is_disk = "disk_parameters" in file.attrs
-            if "parameters" not in file.attrs and not is_disk:
+            # Of fretwear.sector; fretwear.beam leaves parameters too, and has no mesh.
+            is_sector = b'"geometry"' in bytes(file.attrs.get("parameters", b""))
+            if not is_sector and not is_disk:
                 raise InputError(f"{path}: holds no group /mesh, so there is nothing to show a "
                                  "displacement on (docs/files.md says what it holds)")
             observe = file["observe/matrix"][()]

@@ -59,10 +59,10 @@ def write_model(model: ReducedModel, path: str | Path, title: str | None = None,
 def read_parameters(path: str | Path) -> SectorParameters:
     """Parameters from which a model file was generated."""
     with h5py.File(path, "r") as file:
-        if "parameters" not in file.attrs:
-            raise ValueError(f"{path}: no attribute 'parameters'; it was not written by "
-                             "fretwear.sector")
-        groups = json.loads(bytes(file.attrs["parameters"]))
+        groups = json.loads(bytes(file.attrs.get("parameters", b"{}")))
+    if "geometry" not in groups:
+        raise ValueError(f"{path}: no attribute 'parameters' of a sector; it was not written by "
+                         "fretwear.sector")
     return SectorParameters(Geometry(**groups["geometry"]), Material(**groups["material"]),
                             Discretisation(**groups["discretisation"]),
                             # Files of a blade without a lock may not have this group.
