@@ -79,7 +79,7 @@ contains
          end if
          call all%add(member, pair)
       end do
-      call all%join(present, contact%mu, speed)
+      call all%join(present, contact%mu, speed, contact%worn_friction)
       call move_alloc(all, law)
    end subroutine build_law
 

@@ -13,7 +13,7 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (111900, 1000),
+    "lines of src": (112400, 1000),
     "files of src": (478, 10),
     "lines of the longest file": (802, 50),
     "modules used by one file, at most": (33, 2),
