@@ -109,6 +109,9 @@ module fw_point
       real(wp), allocatable :: obstacle_work(:)
       !> The same of elements that are neither pairs nor springs, kind by kind.
       type(element_work), allocatable :: work_of(:)
+      !> Largest velocity of the vibration along that of side 2, as a part of this (n_pairs): 0 of
+      !> pairs that do not bear or whose side 2 does not slide.
+      real(wp), allocatable :: overtaking(:)
       !> Work of hysteretic damping per cycle [force * length], and the rotation speed where it
       !> follows the frequency [rad/s].
       real(wp) :: structural_work = 0.0_wp

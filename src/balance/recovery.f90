@@ -4,13 +4,13 @@ module fw_recovery
    use fw_kinds, only: wp, pi
    use fw_fourier, only: coefficient_count, fourier_type, to_complex
    use fw_balance_state, only: balance_state
-   use fw_force_law, only: prediction_type
+   use fw_force_law, only: pair_open, prediction_type
    use fw_point, only: point_type
    implicit none (type, external)
    private
 
    public :: observe, observed_coefficients, recover_point, recover_histories
-   public :: largest_magnitude, carry_solution, peak_angles
+   public :: largest_magnitude, carry_solution, overtaking_of, peak_angles
 
    !> Angles of the grid on which peaks are looked for, over those of the highest wave.
    integer, parameter :: points_per_wave = 16
@@ -51,7 +51,59 @@ contains
       if (with_contact .and. system%problem%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
       if (with_contact) call find_element_work(system, n_harmonics, point)
+      call find_overtaking(system, x, point)
    end subroutine recover_point
+
+   !> Whether pairs that bear overtake the side 2 that slides under them.
+   subroutine find_overtaking(system, x, point)
+      type(balance_state), intent(in) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      type(point_type), intent(inout) :: point
+      real(wp) :: motion(2*maxval(system%problem%fourier%harmonic) + 1, 2)
+      real(wp), allocatable :: u(:, :, :)
+      integer :: h, i, k, n
+
+      associate (problem => system%problem, entry => system%problem%forces%entry, &
+                 pairs => system%problem%forces%pairs)
+         if (.not. allocated(entry(pairs)%law%prediction%speed)) return
+         ! Another motion of the same point.
+         if (allocated(point%overtaking)) deallocate (point%overtaking)
+         allocate (point%overtaking(problem%n_pairs), source=0.0_wp)
+         allocate (u(problem%n_pairs, 3, problem%fourier%n_coefficients))
+         call problem%incidence%gather(entry(pairs)%rows, problem%structure%n_coordinates, &
+                                       problem%fourier%n_coefficients, x, u)
+         do i = 1, problem%n_pairs
+            if (system%work(pairs)%state(i) == pair_open) cycle
+            motion = 0.0_wp
+            do h = 1, problem%fourier%n_retained
+               n = problem%fourier%harmonic(h)
+               k = problem%fourier%column(h)
+               if (n > 0) motion(2*n:2*n + 1, :) = transpose(u(i, :2, k:k + 1))
+            end do
+            point%overtaking(i) = overtaking_of(motion, entry(pairs)%law%prediction%speed(i, :), &
+                                                system%frequency())
+         end do
+      end associate
+   end subroutine find_overtaking
+
+   !> The largest velocity of a motion along that of a surface, as a part of this.
+   pure real(wp) function overtaking_of(motion, speed, omega) result(part)
+      !> Coefficients (0, c1, s1, ...) along t1 and t2 (2H+1, 2) [length], velocity of the surface
+      !> (2) [length/time] and the frequency.
+      real(wp), intent(in) :: motion(:, :), speed(2), omega
+      real(wp) :: along(size(motion, 1)), rate(size(motion, 1))
+      integer :: n
+
+      part = 0.0_wp
+      if (.not. norm2(speed) > 0.0_wp) return
+      along = matmul(motion, speed)/norm2(speed)
+      rate = 0.0_wp
+      do n = 1, (size(rate) - 1)/2
+         rate(2*n) = n*omega*along(2*n + 1)
+         rate(2*n + 1) = -n*omega*along(2*n)
+      end do
+      part = largest_magnitude(rate)/norm2(speed)
+   end function overtaking_of
 
    !> Observed quantities where the system stands, complex amplitudes (n_observed, n_retained).
    subroutine observe(system, x, observed)

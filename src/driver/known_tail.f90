@@ -329,6 +329,7 @@ contains
       point%coefficients = whole%coefficients(:n, :)
       point%amplitude = [(largest_magnitude(point%coefficients(:, i)), &
                           i=1, size(point%coefficients, 2))]
+      if (allocated(whole%overtaking)) call move_alloc(whole%overtaking, point%overtaking)
       if (.not. allocated(whole%force)) return
       point%force = whole%force(:, :, :n)
       call move_alloc(whole%fraction, point%fraction)

@@ -55,6 +55,10 @@ module fw_remark_table
                   'law = ''regularised'': at some points velocities are so far above '// &
                   'slip_speed that friction turns round between two instants (n_time below '// &
                   '8 max abs(v)/v_0); not where an accuracy watches over the instants'), &
+      remark_kind('sliding may turn', &
+                  'sliding = ''steady'': at some points the velocity of a pair that bears, '// &
+                  'along the surface, exceeds that of the surface, so that friction turns '// &
+                  'round'), &
       ! Parts of the input that change nothing: said, since they were meant to.
       remark_kind('not read', &
                   'the model file holds datasets, groups or attributes that nothing reads, '// &

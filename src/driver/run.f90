@@ -216,6 +216,7 @@ contains
       outcome%out_of_time = run%observer%run_out
       call raise_demand(run%observer, error)
       call run%summary%remark_instants()
+      call run%summary%remark_sliding()
       if (.not. allocated(error)) call run%writer%add(run%summary%remarks, error)
       if (allocated(error) .and. run%state%n_points == 0) then
          ! A result without points is none.

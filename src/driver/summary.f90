@@ -4,6 +4,7 @@ module fw_summary
    use fw_kinds, only: wp, pi
    use fw_bifurcation, only: bifurcation_list, kind_words
    use fw_case, only: case_type
+   use fw_contact_data, only: sliding_steady
    use fw_harmonics_options, only: sampling_events, sampling_uniform
    use fw_balance_state, only: balance_state
    use fw_linear_step, only: linear_step_type
@@ -61,12 +62,18 @@ module fw_summary
       integer, allocatable :: sampling
       !> Converged points whose forces ask for more instants than they had, and the most of these.
       integer :: n_coarse = 0, instants_wanted = 0
+      !> Whether friction has the direction of surfaces that slide, whatever the vibration; points
+      !> at which this overtakes its surface, the most of it, and its pair.
+      logical :: slides_steadily = .false.
+      integer :: n_overtaken = 0, overtaking_pair = 0
+      real(wp) :: overtaking = 0.0_wp
       !> Lines about a nonlinear mode, in place of the peaks.
       type(string_type), allocatable :: mode(:)
    contains
       procedure :: add
       procedure :: add_transient
       procedure :: remark_instants
+      procedure :: remark_sliding
       procedure :: describe_work
       procedure :: describe_peaks
       procedure :: describe_bifurcations
@@ -88,6 +95,7 @@ contains
       allocate (self%peak(size(self%name)), self%peak_place(size(self%name)), source=0.0_wp)
       if (case%over%is_wanted()) self%parameter = parameter_words(case%over%number)
       self%is_controlled = case%control%is_wanted()
+      self%slides_steadily = case%contact%sliding == sliding_steady
       allocate (self%work(0), self%skipped(0))
    end function new_summary
 
@@ -108,6 +116,13 @@ contains
       if (point%instants_wanted > 0 .and. .not. point%error_estimate > 0.0_wp) then
          self%n_coarse = self%n_coarse + 1
          self%instants_wanted = max(self%instants_wanted, point%instants_wanted)
+      end if
+      if (self%slides_steadily .and. allocated(point%overtaking)) then
+         if (any(point%overtaking > 1.0_wp)) self%n_overtaken = self%n_overtaken + 1
+         if (maxval(point%overtaking) > self%overtaking) then
+            self%overtaking = maxval(point%overtaking)
+            self%overtaking_pair = maxloc(point%overtaking, dim=1)
+         end if
       end if
       if (allocated(point%multipliers)) then
          self%verdicts(point%verdict) = self%verdicts(point%verdict) + 1
@@ -138,6 +153,17 @@ contains
          'contact%slip_speed: take harmonics%n_time = '//to_text(self%instants_wanted)// &
          ' or more (8 max|v|/slip_speed), or set harmonics%accuracy')
    end subroutine remark_instants
+
+   !> Where the vibration is faster than the surface that it rubs on. Of all points.
+   subroutine remark_sliding(self)
+      class(summary_type), intent(inout) :: self
+
+      if (self%n_overtaken == 0) return
+      call self%remarks%add('sliding may turn', 'at '//to_text(self%n_overtaken)//' points the '// &
+         'vibration along contact%speed_1, speed_2 is faster than these, up to '// &
+         to_text(self%overtaking)//' times at pair '//to_text(self%overtaking_pair)//': '// &
+         "friction turns round there, which sliding = 'steady' leaves out: compare with 'path'")
+   end subroutine remark_sliding
 
    !> What the linear solver did, and what the case did not need.
    subroutine describe_work(self, system, linear, kind, all_converged)

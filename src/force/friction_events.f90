@@ -61,6 +61,9 @@ contains
       select type (room => work%room)
       class is (event_room)
          call new_event_contact(self%mu, self%present, self%facts%remembers, fourier, room%paths)
+         if (allocated(self%prediction%speed)) then
+            allocate (room%paths%carry(self%n_elements, 2), source=0.0_wp)
+         end if
       end select
    end subroutine reserve
 
@@ -69,6 +72,7 @@ contains
       class(friction_by_events), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
+      integer :: c
 
       if (self%n_elements == 0) return
       call self%take_friction(work)
@@ -78,6 +82,12 @@ contains
          if (allocated(self%worn)) call room%paths%take_friction(work%mu)
          if (allocated(self%share) .and. self%facts%remembers) then
             call room%paths%take_shares(self%share)
+         end if
+         if (allocated(room%paths%carry) .and. work%rate > 0.0_wp) then
+            do c = 1, 2
+               room%paths%carry(:, c) = self%prediction%stiffness(:, c)* &
+                                        self%prediction%speed(:, c)/work%rate
+            end do
          end if
          ! Rates leave the mean position open: for pairs that come to rest it goes along.
          if (any(self%prediction%order > 0) .and. fourier%has_constant()) then
@@ -107,6 +117,10 @@ contains
 
       do i = 1, size(work%rests)
          if (work%rests(i) .or. paths%moved(i) .or. .not. paths%closed(i)) cycle
+         ! On a side that slides nothing comes to rest.
+         if (allocated(paths%carry)) then
+            if (any(abs(paths%carry(i, :)) > 0.0_wp)) cycle
+         end if
          work%rests(i) = .true.
          ! lambda = y - x: with x where it started, the mean force is that of a spring from there.
          work%force(i, 1:2, 1) = work%force(i, 1:2, 1) + work%mean(i, :) - work%x_start(i, :)

@@ -79,7 +79,7 @@ contains
          end if
          call all%add(member, pair)
       end do
-      call all%join(present, contact%mu, speed)
+      call all%join(present, contact%mu, speed, contact%worn_friction)
       call move_alloc(all, law)
    end subroutine build_law
 
@@ -218,6 +218,8 @@ contains
       do k = 1, maxval([group, 0])
          pair = pack([(i, i=1, size(group))], group == k)
          part%n_pairs = size(pair)
+         part%side_1 = contact%side_1(:, pair)
+         part%side_2 = contact%side_2(:, pair)
          part%constants = contact%constants%of_pairs(pair)
          part%mu = contact%mu(pair)
          call take_normal_part(contact, pair, part)

@@ -5,11 +5,12 @@
 !> Members that follow events keep doing so beside members that decide at instants.
 module fw_several_laws
    use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed, &
-      pair_open, pair_stuck
+      pair_stuck
    use fw_fourier, only: fourier_type, new_fourier
    use fw_gap_motion, only: gap_motion
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
+   use fw_steady_slide, only: differentiate_slide, find_slide, lean_block
    use fw_worn_friction, only: worn_friction
    implicit none (type, external)
    private
@@ -28,8 +29,9 @@ module fw_several_laws
       type(member_type), allocatable, private :: member(:)
       !> Of each pair its member, and its place there (n_elements).
       integer, allocatable, private :: of_member(:), place(:)
-      !> Of pairs on a side that slides steadily, whose member presses alone: friction for each
-      !> normal force, mu v/|v| (n_elements, 2); 0 elsewhere. Not allocated where there are none.
+      !> Of pairs on a side that slides steadily, whose member presses alone: where it slides to,
+      !> v/|v| (n_elements, 2), which leans friction of mu times the normal force; 0 elsewhere. Not
+      !> allocated where there are none.
       real(wp), allocatable, private :: lean(:, :)
    contains
       procedure :: add
@@ -92,13 +94,15 @@ contains
    end subroutine add
 
    !> Once all members are there: what the law of all pairs is.
-   subroutine join(self, present, mu, speed)
+   subroutine join(self, present, mu, speed, worn)
       class(several_laws), intent(inout) :: self
       !> Which components exist (3, n_pairs).
       logical, intent(in) :: present(:, :)
       !> Of pairs on a side that slides steadily, whose members press alone and see no tangential
-      !> directions: friction coefficients (n_pairs) and velocities (n_pairs, 2), 0 for others.
+      !> directions: friction coefficients (n_pairs) and velocities (n_pairs, 2), 0 for others; and
+      !> how friction changes with wear.
       real(wp), intent(in) :: mu(:), speed(:, :)
+      type(worn_friction), allocatable, intent(in) :: worn
       integer :: i, m, n
 
       n = size(present, 2)
@@ -131,24 +135,34 @@ contains
          p%takes_balance = any(p%own%takes_balance)
          p%has_inertia = any(p%own%has_inertia)
       end associate
-      if (any(abs(speed) > 0.0_wp)) call take_lean(self, mu, speed)
+      if (any(abs(speed) > 0.0_wp)) then
+         call take_lean(self, mu, speed)
+         if (allocated(worn)) self%worn = worn
+      end if
       call find_facts(self)
    end subroutine join
 
-   !> Friction of pairs on a side that slides steadily, for each normal force.
+   !> Friction of pairs on a side that slides steadily.
    pure subroutine take_lean(self, mu, speed)
       class(several_laws), intent(inout) :: self
       real(wp), intent(in) :: mu(:), speed(:, :)
       real(wp) :: size_of
-      integer :: i
+      integer :: c, i
 
       allocate (self%lean(self%n_elements, 2), source=0.0_wp)
       if (.not. allocated(self%prediction%speed)) allocate (self%prediction%speed, source=self%lean)
       do i = 1, self%n_elements
          size_of = norm2(speed(i, :))
          if (.not. size_of > 0.0_wp) cycle
-         self%lean(i, :) = merge(mu(i)*speed(i, :)/size_of, 0.0_wp, self%present(1:2, i))
+         self%lean(i, :) = merge(speed(i, :)/size_of, 0.0_wp, self%present(1:2, i))
          self%prediction%speed(i, :) = speed(i, :)
+         self%mu(i) = mu(i)
+         ! No force depends on how far they slide, but what they wear does: in lengths, where no
+         ! stiffness of the structure stands for them.
+         if (self%prediction%takes(i)) cycle
+         do c = 1, 2
+            self%prediction%stiffness(i, c) = merge(1.0_wp, 0.0_wp, self%present(c, i))
+         end do
       end do
    end subroutine take_lean
 
@@ -162,9 +176,11 @@ contains
    end function leans
 
    !> Friction of the pairs that lean, from their normal forces (n_pairs, 3, :).
-   pure subroutine add_lean(self, at, force)
+   pure subroutine add_lean(self, at, mu, force)
       class(several_laws), intent(in) :: self
       integer, intent(in) :: at(:)
+      !> Friction coefficients (n_pairs).
+      real(wp), intent(in) :: mu(:)
       real(wp), intent(inout) :: force(:, :, :)
       integer :: c, i
 
@@ -172,32 +188,10 @@ contains
       do i = 1, size(at)
          if (.not. self%leans(at(i))) cycle
          do c = 1, 2
-            force(at(i), c, :) = self%lean(at(i), c)*force(at(i), 3, :)
+            force(at(i), c, :) = mu(at(i))*self%lean(at(i), c)*force(at(i), 3, :)
          end do
       end do
    end subroutine add_lean
-
-   !> The block of a pair that leans, from that of its member: of a pair that always bears, too.
-   pure subroutine lean_block(lean, nc, state, block)
-      real(wp), intent(in) :: lean(2)
-      integer, intent(in) :: nc
-      integer, intent(inout) :: state
-      !> Transposed derivative (input, output).
-      real(wp), intent(inout) :: block(:, :)
-      integer :: c, k
-
-      if (state == pair_open) return
-      if (state == pair_stuck) then
-         block = 0.0_wp
-         do k = 2*nc + 1, 3*nc
-            block(k, k) = 1.0_wp
-         end do
-         state = pair_mixed
-      end if
-      do c = 1, 2
-         block(:, (c - 1)*nc + 1:c*nc) = lean(c)*block(:, 2*nc + 1:)
-      end do
-   end subroutine lean_block
 
    !> What grows of some pairs among all.
    pure subroutine join_growth(growth, at, n, joined)
@@ -261,19 +255,21 @@ contains
       allocate (facts(size(self%member)))
       do m = 1, size(facts)
          facts(m) = self%member(m)%law%facts
+         if (self%leans(self%member(m)%pair(1))) facts(m)%measures_slip = .true.
       end do
       self%facts = common_facts(facts)
       if (allocated(self%lean)) call lean_facts(self%facts)
+      self%facts%measures_slip = all(facts%measures_slip)
    end subroutine find_facts
 
-   !> What steady sliding takes from a law of the pairs.
+   !> What steady sliding takes from a law of the pairs, and what it adds: friction follows from
+   !> what presses, and so does what it wears.
    elemental subroutine lean_facts(facts)
       type(law_facts), intent(inout) :: facts
 
       facts%is_odd = .false.
-      facts%measures_slip = .false.
+      facts%measures_slip = .true.
       facts%has_multipliers = .false.
-      facts%is_integrated = .false.
       facts%acts_at_once = .false.
    end subroutine lean_facts
 
@@ -316,7 +312,7 @@ contains
             law%present = self%present(:, at)
             law%present(1:2, :) = law%present(1:2, :) .and. &
                .not. spread(self%leans(at), 1, 2)
-            law%mu = self%mu(at)
+            law%mu = merge(0.0_wp, self%mu(at), self%leans(at))
             law%prediction%stiffness = self%prediction%stiffness(at, :)
             law%prediction%gap = self%prediction%gap(at)
             law%prediction%load = self%prediction%load(at)
@@ -426,24 +422,33 @@ contains
                   call law%evaluate(fourier, own)
                end if
                call give_forces(self%member(m)%pair, own, work)
-               call lean_forces(self, self%member(m)%pair, work)
+               call lean_forces(self, fourier, self%member(m)%pair, work)
             end associate
          end do
       end select
    end subroutine evaluate_members
 
    !> Pairs that lean slip wherever they bear, and come to rest nowhere.
-   pure subroutine lean_forces(self, at, work)
+   pure subroutine lean_forces(self, fourier, at, work)
       class(several_laws), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
       integer, intent(in) :: at(:)
       type(force_workspace), intent(inout) :: work
+      real(wp) :: slide
+      integer :: i
 
       if (.not. allocated(self%lean)) return
-      call add_lean(self, at, work%force)
+      call add_lean(self, at, work%mu, work%force)
       where (self%leans(at))
          work%rests(at) = .false.
          work%state(at) = merge(pair_mixed, work%state(at), work%state(at) == pair_stuck)
       end where
+      if (.not. work%measures_slip) return
+      do i = 1, size(at)
+         if (.not. self%leans(at(i))) cycle
+         call find_slide(self%prediction, self%lean(at(i), :), fourier, at(i), work, slide)
+         work%slip(at(i)) = slide
+      end do
    end subroutine lean_forces
 
    !> From the workspace of all pairs to that of a member.
@@ -508,10 +513,16 @@ contains
                   end if
                   if (.not. self%leans(at(i))) cycle
                   work%linear_rests(at(i)) = .false.
-                  call lean_block(self%lean(at(i), :), fourier%n_coefficients, &
+                  call lean_block(work%mu(at(i))*self%lean(at(i), :), fourier%n_coefficients, &
                                   work%linear_state(at(i)), work%jacobian(:, :, at(i)))
                end do
-               if (own%measures_slip) work%slip_derivative(:, at) = own%slip_derivative
+               if (.not. own%measures_slip) cycle
+               work%slip_derivative(:, at) = own%slip_derivative
+               if (.not. own%differentiates_slip) cycle
+               do i = 1, size(at)
+                  if (self%leans(at(i))) call differentiate_slide( &
+                     self%prediction, self%lean(at(i), :), fourier, at(i), work)
+               end do
             end associate
          end do
       end select
@@ -534,7 +545,7 @@ contains
                end if
                call self%member(m)%law%sample(own)
                work%force_time(at, :, :) = own%force_time
-               call add_lean(self, at, work%force_time)
+               call add_lean(self, at, work%mu, work%force_time)
             end associate
          end do
       end select
@@ -556,7 +567,7 @@ contains
             of_member = force(self%member(m)%pair, :, :)
             call self%member(m)%law%coefficients(room%work(m), computed, fourier, of_member)
             force(self%member(m)%pair, :, :) = of_member
-            call add_lean(self, self%member(m)%pair, force)
+            call add_lean(self, self%member(m)%pair, work%mu, force)
          end do
       end select
    end subroutine coefficients
@@ -576,7 +587,7 @@ contains
             of_member = force(self%member(m)%pair, :, :)
             call self%member(m)%law%tail(room%work(m), highest, of_member)
             force(self%member(m)%pair, :, :) = of_member
-            call add_lean(self, self%member(m)%pair, force)
+            call add_lean(self, self%member(m)%pair, work%mu, force)
          end do
       end select
    end subroutine tail
@@ -627,6 +638,15 @@ contains
       real(wp), intent(in) :: y(3)
       real(wp), intent(out) :: force(3), slope(3, 3)
 
+      if (self%leans(element)) then
+         ! The member presses alone.
+         call self%member(self%of_member(element))%law%at_instant( &
+            self%place(element), [0.0_wp, 0.0_wp, y(3)], force, slope)
+         slope(:2, :) = 0.0_wp
+         force(:2) = self%mu(element)*self%lean(element, :)*force(3)
+         slope(3, :2) = self%mu(element)*self%lean(element, :)*slope(3, 3)
+         return
+      end if
       call self%member(self%of_member(element))%law%at_instant(self%place(element), y, force, slope)
    end subroutine at_instant
 

@@ -20,6 +20,9 @@ module fw_read_obstacle
    character(*), parameter :: term_keys(*) = &
       [character(13) :: 'gap_pair', 'gap_harmonic', 'gap_order', 'gap_amplitude', 'gap_phase']
 
+   !> Constants by which friction follows the speed.
+   character(*), parameter :: of_speed(*) = [character(10) :: 'mu_dynamic', 'mu_viscous']
+
 contains
 
    !> Within group &contact, after its pairs and their constants.
@@ -162,6 +165,8 @@ contains
 
       if (contact%n_pairs == 0) return
       speed = contact%speeds()
+      call check_laws(reader, contact, speed)
+      if (reader%failed()) return
       if (contact%sliding == sliding_path) then
          do i = 1, contact%n_pairs
             ! Smooth friction shares itself out between both directions.
@@ -189,6 +194,37 @@ contains
       call reader%refuse('contact', 'sliding', "= '"//trim(sliding_words(sliding_steady))// &
                          "' needs a direction: give speed_1 or speed_2")
    end subroutine check_sliding
+
+   !> A speed for all pairs may be meant for those whose law has one: others would be at rest
+   !> without a word. So would what friction of a law does with its speed, where it has none.
+   subroutine check_laws(reader, contact, speed)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(in) :: contact
+      real(wp), intent(in) :: speed(:, :)
+      integer :: i, k, law
+
+      do i = 1, contact%n_pairs
+         if (all(abs(speed(i, :)) <= 0.0_wp)) cycle
+         law = contact%law
+         if (allocated(contact%law_of)) law = contact%law_of(i)
+         if (.not. contact%constants%is_taken(law, 'speed_1')) then
+            k = maxloc(abs(speed(i, :)), dim=1)
+            call reader%refuse('contact', 'speed_'//to_text(k), '= '//to_text(speed(i, k))// &
+                               ' for pair '//to_text(i)//" with law = '"//trim(law_words(law))// &
+                               "', which knows no side that slides: must be 0 there")
+            return
+         end if
+         if (contact%sliding == sliding_path) cycle
+         do k = 1, size(of_speed)
+            if (.not. contact%constants%is_taken(law, trim(of_speed(k)))) cycle
+            if (.not. contact%constants%has(trim(of_speed(k)))) cycle
+            call reader%refuse('contact', trim(of_speed(k)), "beside sliding = 'steady', whose "// &
+                               'friction is mu p whatever the speed: give mu at that speed, or '// &
+                               "use sliding = 'path'")
+            return
+         end do
+      end do
+   end subroutine check_laws
 
    !> Pairs whose distance is a displacement.
    pure function has_gap(contact)

@@ -3,6 +3,7 @@
 !>   s = s_free - W lambda,
 !>   normal      lambda_n <= 0, s_n >= 0, lambda_n s_n = 0          (Signorini),
 !>   tangential  |lambda_t| <= mu |lambda_n|, in slip lambda_t = mu |lambda_n| s_t/|s_t|  (Coulomb),
+!>   steadily    lambda_t = mu v/|v| lambda_n                 (side 2 slides, whatever s_t),
 !>   springs     lambda = coefficient s**power,
 !>   elements    lambda = f(s, ds/dt) of their rows together,
 !>   others      lambda = f(s, ds/dt) at the middle of the step (laws that act at once).
@@ -209,7 +210,12 @@ contains
             y = 0.0_wp
          else
             if (structure%row(3, i) > 0) slope(3, 3) = 1.0_wp
-            if (length <= limit) then
+            if (structure%leans(i)) then
+               ! Where side 2 slides to, friction follows from what presses alone.
+               self%state(i) = state_slip
+               y(1:2) = -p*structure%lean(:, i)
+               if (structure%row(3, i) > 0) slope(1:2, 3) = structure%lean(:, i)
+            else if (length <= limit) then
                self%state(i) = state_stick
                slope(1, 1) = 1.0_wp
                slope(2, 2) = 1.0_wp
@@ -258,7 +264,8 @@ contains
          self%state(i) = state_open
          ! Smooth friction never sticks; without friction there is nothing to slip.
          if (force(3) < 0.0_wp) self%state(i) = merge(state_slip, state_stick, &
-                                                      law%prediction%order_of(i, 1) > 0)
+                                                      law%prediction%order_of(i, 1) > 0 .or. &
+                                                      structure%leans(i))
       end associate
       do c = 1, 3
          self%slope(c, :, i) = slope(:, c)*by_s

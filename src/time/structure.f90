@@ -7,7 +7,7 @@
 !> directions are separated by an orthogonal projection and follow the others without inertia.
 module fw_time_structure
    use fw_kinds, only: wp
-   use fw_contact_data, only: contact_type, spring_type
+   use fw_contact_data, only: contact_type, sliding_steady, spring_type
    use fw_element_forces, only: element_forces, new_element_forces
    use fw_element_group, only: element_group, group_name_length
    use fw_elements, only: element_list
@@ -66,6 +66,9 @@ module fw_time_structure
       !> (n_pairs, 2) [length/time].
       type(gap_motion), allocatable :: motion
       real(wp), allocatable :: speed(:, :)
+      !> Of pairs whose side 2 slides steadily, tangential forces over the normal one, mu v/|v|; 0
+      !> of all others (2, n_pairs).
+      real(wp), allocatable :: lean(:, :)
       !> The law of the pairs, those that act at once, by its `at_instant` (n_pairs), and the depth
       !> that they are worn by [length].
       class(pair_law), allocatable :: law
@@ -82,6 +85,7 @@ module fw_time_structure
       real(wp), allocatable :: massive(:, :)
    contains
       procedure :: project
+      procedure :: leans
    end type time_structure
 
 contains
@@ -142,9 +146,11 @@ contains
       allocate (self%rows(self%n_dof, 3*contact%n_pairs + self%n_springs), source=0.0_wp)
       allocate (self%mu(0), self%gap(0), self%normal_load(0), self%at_once(0), self%depth(0))
       self%speed = contact%speeds()
+      allocate (self%lean(2, contact%n_pairs), source=0.0_wp)
       if (contact%n_pairs == 0) return
       call build_law(contact, present, self%law)
       self%mu = self%law%mu
+      if (contact%sliding == sliding_steady) call take_lean(self, present)
       self%at_once = [(self%law%acts_alone(i), i=1, contact%n_pairs)]
       self%depth = 0.0_wp*self%mu
       if (allocated(contact%depth)) self%depth = contact%depth
@@ -159,8 +165,11 @@ contains
             if (.not. self%law%prediction%takes(i)) then
                associate (stiffness => self%law%prediction%stiffness(i, c))
                   if (stiffness <= 0.0_wp) cycle
-                  ! A pair that acts at once is its own law, as a spring is.
-                  if (.not. self%at_once(i)) self%compliance(self%n_rows + 1) = 1.0_wp/stiffness
+                  ! A pair that acts at once is its own law, as a spring is; friction of steady
+                  ! sliding is no spring's.
+                  if (.not. (self%at_once(i) .or. (c < 3 .and. self%leans(i)))) then
+                     self%compliance(self%n_rows + 1) = 1.0_wp/stiffness
+                  end if
                end associate
             end if
             self%n_rows = self%n_rows + 1
@@ -170,6 +179,28 @@ contains
          end do
       end do
    end subroutine take_pairs
+
+   !> Friction that has the direction of side 2 whatever the vibration.
+   pure subroutine take_lean(self, present)
+      type(time_structure), intent(inout) :: self
+      logical, intent(in) :: present(:, :)
+      integer :: i
+
+      do i = 1, self%n_pairs
+         associate (v => self%speed(i, :))
+            if (norm2(v) > 0.0_wp) self%lean(:, i) = merge(self%mu(i)*v/norm2(v), 0.0_wp, &
+                                                           present(1:2, i))
+         end associate
+      end do
+   end subroutine take_lean
+
+   !> Whether side 2 of a pair slides steadily under friction.
+   elemental logical function leans(self, pair)
+      class(time_structure), intent(in) :: self
+      integer, intent(in) :: pair
+
+      leans = any(abs(self%lean(:, pair)) > 0.0_wp)
+   end function leans
 
    !> Rows of elements behind those of the pairs: their inputs.
    subroutine take_kinds(elements, rows, self)

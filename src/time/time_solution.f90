@@ -9,6 +9,7 @@ module fw_time_solution
       sampled_coefficients
    use fw_periodic_state, only: find_periodic_state, period_map, periodic_report
    use fw_point, only: point_type
+   use fw_recovery, only: overtaking_of
    use fw_smooth_integration, only: is_smooth, new_smooth_integration, smooth_integration
    use fw_time_options, only: time_options
    use fw_time_stepper, only: new_time_stepper, time_stepper
@@ -83,6 +84,7 @@ contains
          end if
          if (allocated(error)) return
          call fill_point(stepper%record, n_harmonics, point)
+         call find_overtaking(structure, stepper%record, omega, n_harmonics, point)
          ! A step whose contact problem was not solved does not obey the equations, even if the
          ! period repeats.
          report%converged = report%converged .and. stepper%record%n_failed == 0
@@ -124,6 +126,28 @@ contains
          end do
       end do
    end function row_memory
+
+   !> Whether pairs that bear overtake the side 2 that slides under them.
+   subroutine find_overtaking(structure, record, omega, n_harmonics, point)
+      type(time_structure), intent(in) :: structure
+      type(period_record), intent(in) :: record
+      real(wp), intent(in) :: omega
+      integer, intent(in) :: n_harmonics
+      type(point_type), intent(inout) :: point
+      real(wp) :: motion(2*n_harmonics + 1, 2)
+      integer :: c, i
+
+      if (.not. any(abs(structure%speed) > 0.0_wp)) return
+      allocate (point%overtaking(structure%n_pairs), source=0.0_wp)
+      do i = 1, structure%n_pairs
+         ! Without a force nothing turns.
+         if (all(abs(record%force(:, i, :)) <= 0.0_wp)) cycle
+         do c = 1, 2
+            motion(:, c) = averaged_coefficients(record%slip(c, i, :), n_harmonics)
+         end do
+         point%overtaking(i) = overtaking_of(motion, structure%speed(i, :), omega)
+      end do
+   end subroutine find_overtaking
 
    !> Harmonics of the recorded period, as those of a balance are reported.
    subroutine fill_point(record, n_harmonics, point)

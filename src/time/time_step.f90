@@ -252,7 +252,7 @@ contains
                carried = self%gap(i, 3) - self%gap(i, 1)
                if (c < 3) carried = -s%speed(i, c)*duration
                record%obstacle_work(i) = record%obstacle_work(i) + force*carried
-               if (s%at_once(i)) then
+               if (s%at_once(i) .or. (c < 3 .and. s%leans(i))) then
                   if (s%massless(r)) step_length = self%row_increment(r)
                   step_length = step_length + carried
                else if (in_positions(s, r)) then

@@ -197,6 +197,8 @@ contains
 
       associate (s => self%structure)
          do i = 1, s%n_pairs
+            ! Where forces need no anchor there is none to leave it.
+            if (s%at_once(i) .or. s%leans(i)) cycle
             do c = 1, 2
                if (s%row(c, i) > 0) self%memory(s%row(c, i)) = self%memory(s%row(c, i)) + &
                   2.0_wp*pi/self%omega*s%speed(i, c)

@@ -45,6 +45,9 @@ module fw_event_contact
       !> Coefficients of the contact forces of pairs with one direction (n_coefficients, tangential
       !> and normal, n_pairs).
       real(wp), allocatable, private :: out(:, :, :)
+      !> What side 2 slides of each pair in an angle of 1, times the stiffness (n_pairs, 2) [force];
+      !> not allocated where none does.
+      real(wp), allocatable :: carry(:, :)
    contains
       procedure :: take_friction
       procedure :: take_shares
@@ -166,9 +169,10 @@ contains
 
       subroutine evaluate_one(i)
          integer, intent(in) :: i
-         real(wp) :: start(2), at_rest(2)
+         real(wp) :: start(2), at_rest(2), carried
          integer :: c
 
+         carried = 0.0_wp
          at_rest = 0.0_wp
          if (may_rest) at_rest = mean(i, :)
          if (self%is_planar(i)) then
@@ -181,6 +185,17 @@ contains
             x(i, :) = self%planar(i)%z_end
             return
          end if
+         associate (pair => self%pair(i))
+            pair%curves%carry = 0.0_wp
+            if (allocated(self%carry) .and. self%direction(i) > 0) then
+               if (pair%remembers) then
+                  pair%curves%carry = self%carry(i, self%direction(i))
+               else
+                  ! Rates are those against the surface, and come to rest nowhere.
+                  carried = self%carry(i, self%direction(i))
+               end if
+            end if
+         end associate
          ! Values and slopes at the instants; those of a component that does not exist are zero.
          do c = 1, 6
             if (c <= 3 .and. self%direction(i) == 0) cycle
@@ -188,8 +203,8 @@ contains
             call fourier%row_to_time(self%batch(:, c, i), self%samples(:, c, i))
          end do
          call evaluate_pair(self%pair(i), fourier, self%batch(:, :, i), self%samples(:, :, i), &
-                            offset(i), x_start(i, max(1, self%direction(i))), &
-                            may_rest, at_rest(max(1, self%direction(i))), self%rests(i))
+                            offset(i), x_start(i, max(1, self%direction(i))), may_rest, &
+                            at_rest(max(1, self%direction(i))), carried, self%rests(i))
          self%closed(i) = self%pair(i)%path%closed
          self%open(i) = self%pair(i)%path%open
          self%moved(i) = self%pair(i)%path%moved
@@ -242,7 +257,7 @@ contains
 
    !> A pair with at most one tangential direction.
    pure subroutine evaluate_pair(pair, fourier, coefficients, samples, offset, x_start, may_rest, &
-                                 mean, rests)
+                                 mean, carried, rests)
       type(event_pair_type), intent(inout) :: pair
       type(fourier_type), intent(in) :: fourier
       !> Coefficients and samples as in `batch`, without the offset (of y_n, hence taken off N); the
@@ -252,10 +267,16 @@ contains
       !> whether it does.
       logical, intent(in) :: may_rest
       real(wp), intent(in) :: mean
+      !> What a rate is less against a side 2 that slides.
+      real(wp), intent(in) :: carried
       logical, intent(out) :: rests
 
       rests = .false.
-      call fill_curves(pair%curves, fourier, coefficients, samples, offset, 0.0_wp)
+      call fill_curves(pair%curves, fourier, coefficients, samples, offset, -carried)
+      if (abs(carried) > 0.0_wp) then
+         call pair%follow(x_start)
+         return
+      end if
       if (may_rest .and. pair%can_rest()) then
          call fill_curves(pair%curves, fourier, coefficients, samples, offset, mean)
          call pair%follow_to_rest(x_start, rests)

@@ -2,7 +2,7 @@
 !> roots: P the tangential prediction, N = -y_n the normal pressure, Q = mu N, and the bounds
 !> P - Q and P + Q between which the corrected position lies.
 module fw_event_curves
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 
@@ -24,6 +24,9 @@ module fw_event_curves
       real(wp) :: scale = 0.0_wp
       !> N is constant.
       logical :: steady = .false.
+      !> How fast side 2 takes the corrected position along [force/rad]: bounds are then counted in
+      !> a frame that goes with it.
+      real(wp) :: carry = 0.0_wp
    contains
       procedure :: reserve
       procedure :: combine
@@ -68,6 +71,11 @@ contains
                       mu*(abs(self%normal(m, 1)) + abs(self%normal(m, 2)))
          if (m > 0) self%steady = self%steady .and. all(abs(self%normal(m, :)) <= 0.0_wp)
       end do
+      if (.not. abs(self%carry) > 0.0_wp) return
+      ! In its frame a bound has the slope of P -+ Q less that of the frame.
+      self%lower_slope(0, 1) = self%lower_slope(0, 1) - self%carry
+      self%upper_slope(0, 1) = self%upper_slope(0, 1) - self%carry
+      self%scale = self%scale + 2.0_wp*pi*abs(self%carry)
    end subroutine combine
 
    !> Values and slopes on the grid of P + side Q, or of its derivative.
@@ -85,6 +93,7 @@ contains
          self%values(k) = self%samples(k, first) + side*self%mu*self%samples(k, first + 3)
          self%slopes(k) = self%samples(k, first + 1) + side*self%mu*self%samples(k, first + 4)
       end do
+      if (of_derivative .and. abs(self%carry) > 0.0_wp) self%values = self%values - self%carry
    end subroutine sample_bound
 
 end module fw_event_curves

@@ -162,7 +162,32 @@ contains
       call self%slip%finish()
       call self%contact%finish()
       call self%held%finish()
+      if (abs(self%path%carry) > 0.0_wp) call add_carried(self)
    end subroutine fill_moments
+
+   !> What side 2 carries z along while the pair sticks, carry tau: its integrals against the waves,
+   !> by parts.
+   pure subroutine add_carried(self)
+      class(event_pair_type), intent(inout) :: self
+      real(wp) :: angle, side
+      integer :: j, k, m
+
+      do j = 1, self%path%n_segments
+         if (self%path%phase(j) /= phase_stick) cycle
+         do k = j, j + 1
+            side = merge(-1.0_wp, 1.0_wp, k == j)*self%path%carry
+            angle = self%path%angle(k)
+            call set_waves(self, k)
+            self%held%cosine(0) = self%held%cosine(0) + 0.5_wp*side*angle**2
+            do m = 1, 2*self%held%degree
+               associate (c => self%cosines(m), s => self%sines(m))
+                  self%held%cosine(m) = self%held%cosine(m) + side*(angle*s/m + c/m**2)
+                  self%held%sine(m) = self%held%sine(m) + side*(s/m**2 - angle*c/m)
+               end associate
+            end do
+         end do
+      end do
+   end subroutine add_carried
 
    !> Waves at the start of segment j; those at both ends of the period are the same to the last
    !> bit.
@@ -365,7 +390,7 @@ contains
          select case (self%path%phase(j))
          case (phase_stick)
             p = value_of(self%curves%degree, self%curves%tangential, self%cosines, self%sines)
-            tangential(k) = p - self%path%z(j)
+            tangential(k) = p - self%path%z(j) - self%path%carry*angle
          case (phase_forward)
             tangential(k) = self%curves%mu*pressure
          case (phase_backward)
@@ -462,6 +487,8 @@ contains
          if (self%remembers) then
             call differentiate(c%degree, c%tangential, self%rate)
             call differentiate(c%degree, c%normal, self%normal_rate)
+            ! Against the surface that moves.
+            self%rate(0, 1) = self%rate(0, 1) - c%carry
          else
             self%rate = c%tangential
             self%normal_rate = c%normal

@@ -15,6 +15,11 @@
 !> The order matters: a bound is compared with z at breakpoints only, and the angle where it catches
 !> z between two of them is found afterwards. That angle does not enter z, so its round-off does not
 !> accumulate along the path.
+!>
+!> Where side 2 slides, z is carried along with a slope `carry` while the pair sticks. In a frame
+!> that goes with it z stands, the bounds are P -+ Q - carry tau, and all of the above holds; slip
+!> ends where the slope of P -+ Q passes `carry`. From turn to turn z gains what the frame has moved
+!> in one: it is clamped and moved on, which has one limit, found in one turn from far ahead.
 module fw_event_path
    use fw_event_curves, only: curves_type
    use fw_event_polynomial, only: value_and_slope
@@ -42,8 +47,8 @@ module fw_event_path
       !> waves e at that angle. Where `set` is false z is the given start of the march.
       real(wp), allocatable :: z(:), set_at(:), weight(:)
       logical, allocatable :: set(:)
-      !> z at the end of the period.
-      real(wp) :: z_end = 0.0_wp
+      !> z at the end of the period, and its slope while it is carried along.
+      real(wp) :: z_end = 0.0_wp, carry = 0.0_wp
       !> Whether the pair bears throughout, or never; whether z was set at all.
       logical :: closed = .true., open = .false., moved = .false.
       !> Whether the residual traction is given where the pair can stick throughout, and as which
@@ -104,7 +109,7 @@ contains
 
       call find_contact(self, curves)
       call add_roots(self, curves, at_lower, .true.)
-      ! Under a constant load both bounds have their extrema where P has them.
+      ! Under a constant load both bounds have their extrema where P has them, in any frame.
       if (.not. curves%steady) call add_roots(self, curves, at_upper, .true.)
       call finish_breaks(self)
       call evaluate_bounds(self, curves)
@@ -113,6 +118,12 @@ contains
       if (self%reach > 0.0_wp) return
       self%moved = .not. self%closed
       position%z = z_start
+      self%carry = curves%carry
+      if (abs(curves%carry) > 0.0_wp) then
+         ! It slips in every turn: from ahead of both bounds friction has always pulled it back.
+         self%moved = .true.
+         position%z = sign(2.0_wp*curves%scale, curves%carry)
+      end if
       ! A given start outside of the bounds is taken to the nearer of them.
       if (.not. self%lifted(1)) call clamp(self, 1, position)
       do k = 1, self%n_breaks - 1
@@ -123,12 +134,13 @@ contains
          end if
       end do
       ! The turn to settle has left z where the period starts: the same turn once more is recorded.
+      position%z = position%z + 2.0_wp*pi*curves%carry
       self%n_segments = 0
       do k = 1, self%n_breaks - 1
          call record(self, curves, k, position)
       end do
       self%angle(self%n_segments + 1) = 2.0_wp*pi
-      self%z_end = position%z
+      self%z_end = position%z + 2.0_wp*pi*curves%carry
    end subroutine trace
 
    !> Stick throughout, where the bounds leave a z: it is between the highest point of the lower
@@ -222,7 +234,7 @@ contains
       ! The bound holds z already; or round-off has put it past.
       if (at_left*at_right >= 0.0_wp) return
       angle = root_between(curves%degree, bound, z, left, right, at_left, at_right, &
-                           round_off*curves%scale)
+                           round_off*curves%scale, curves%carry)
    end function catch_angle
 
    !> Add a segment, or continue the last one.
@@ -393,18 +405,20 @@ contains
          self%landing(k) = 0.0_wp
          if (self%kind(k) == at_lift .and. abs(dn) > 0.0_wp) then
             ! Without friction nothing sticks, and z has no use for its derivative.
-            if (curves%mu > 0.0_wp) self%landing(k) = -dp/(curves%mu*dn)
+            if (curves%mu > 0.0_wp) self%landing(k) = -(dp - curves%carry)/(curves%mu*dn)
             ! N = 0 to the last bit at its root, so that both bounds are the same number there.
             n = 0.0_wp
          else if (self%lifted(k)) then
             n = 0.0_wp
          end if
+         p = p - curves%carry*self%break(k)
          self%lower(k) = p - curves%mu*n
          self%upper(k) = p + curves%mu*n
       end do
-      ! The end of the period is its start to the last bit: z repeats exactly.
-      self%lower(self%n_breaks) = self%lower(1)
-      self%upper(self%n_breaks) = self%upper(1)
+      ! The end of the period is its start to the last bit, but for what the frame has moved: z
+      ! repeats exactly.
+      self%lower(self%n_breaks) = self%lower(1) - 2.0_wp*pi*curves%carry
+      self%upper(self%n_breaks) = self%upper(1) - 2.0_wp*pi*curves%carry
       self%landing(self%n_breaks) = 0.0_wp
    end subroutine evaluate_bounds
 

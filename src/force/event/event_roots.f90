@@ -224,11 +224,13 @@ contains
    !> The angle in [left, right] where p = level, p - level having other signs at the two ends:
    !> Newton's method, kept within the bracket by halving, until p - level is round-off.
    pure real(wp) function root_between(degree, p, level, left, right, left_value, right_value, &
-                                       noise) result(angle)
+                                       noise, incline) result(angle)
       integer, intent(in) :: degree
       real(wp), intent(in) :: p(0:degree, 2), level, left, right
       !> p - level at the ends, and its round-off.
       real(wp), intent(in) :: left_value, right_value, noise
+      !> How the level rises with the angle, from that at 0 (default: not at all).
+      real(wp), intent(in), optional :: incline
       real(wp) :: low, high, value, slope, step, trial
       integer :: k
 
@@ -243,6 +245,10 @@ contains
       do k = 1, newton_steps
          call value_and_slope(degree, p, angle, value, slope)
          value = value - level
+         if (present(incline)) then
+            value = value - incline*angle
+            slope = slope - incline
+         end if
          ! The bracket shrinks on the side whose sign the value has.
          if ((value > 0.0_wp) .eqv. (left_value > 0.0_wp)) then
             low = angle
