@@ -676,6 +676,13 @@ class Solver(TypedDict, total=False):
     fallback: bool
     #: leave out stuck pairs and components that nothing moves (default: .true.)
     skips: bool
+    #: solutions of the point at most, which become rows by rising amplitude; above 1 further ones
+    #: are searched for by deflation; only: analysis = 'point' (default: 1)
+    n_solutions: int
+    #: power of the distance by which known solutions repel; only: n_solutions > 1 (default: 2)
+    deflation_power: float
+    #: of the factor that repels, far from all known solutions; only: n_solutions > 1 (default: 1)
+    deflation_shift: float
 
 
 class PseudoTime(TypedDict, total=False):

@@ -117,6 +117,8 @@ contains
          asked = a == analysis_wear
       case ("case%analysis other than 'wear'")
          asked = a /= analysis_wear
+      case ("case%analysis other than 'point'")
+         asked = a /= analysis_point
       case ("case%analysis other than 'frf'")
          asked = a /= analysis_frf
       case ("case%analysis other than 'frf' or 'point'")
@@ -180,6 +182,8 @@ contains
          asked = case%harmonics%sampling == sampling_uniform
       case ("solver%kind other than 'newton'")
          asked = case%solver%kind /= solver_newton
+      case ('solver%n_solutions > 1')
+         asked = case%solver%n_solutions > 1
       case ("solver%kind = 'pseudo_time'")
          asked = case%solver%kind == solver_pseudo_time
       case ('output%histories')

@@ -108,6 +108,16 @@ module fw_rules
       rule_type(of_residual, 'a law that takes integrals between its events', &
                 "use 'penalty' or 'dlft'")]
 
+   !> Further solutions are looked for in one balance by Newton's method, from none but itself.
+   type(rule_type), parameter :: of_solutions(*) = [ &
+      rule_type('solver%n_solutions > 1', "case%analysis other than 'point'", &
+                "use 'point', frequency by frequency; a branch (sweep%continuation = "// &
+                "'arclength') follows folds"), &
+      rule_type('solver%n_solutions > 1', "solver%kind other than 'newton'", "use 'newton'"), &
+      rule_type('solver%n_solutions > 1', 'harmonics%accuracy', 'give n_harmonics'), &
+      rule_type('solver%n_solutions > 1', 'group &control', 'give the load'), &
+      rule_type('solver%n_solutions > 1', "contact%memory = 'carried'", "use 'assembly'")]
+
    !> The factor of the load is an unknown of its own: what follows solves without such a border,
    !> or for a load that the case gives.
    type(rule_type), parameter :: of_control(*) = [ &
@@ -282,7 +292,7 @@ module fw_rules
    type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, &
                                              of_matrices, of_laws, of_base, of_elements, of_wear, &
                                              of_derivatives, of_stress, of_diagrams, of_ranges, &
-                                             of_obstacles, of_free_decay]
+                                             of_obstacles, of_free_decay, of_solutions]
 
 contains
 

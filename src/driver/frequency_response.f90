@@ -23,6 +23,7 @@ module fw_frequency_response
    use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_open, remark_peaks, &
       remark_range, remark_stability
    use fw_point, only: point_type
+   use fw_several_solutions, only: several_source
    use fw_sinks, only: point_sink
    use fw_solver_options, only: continuation_arclength
    use fw_stability_verdict, only: verdict_undecided
@@ -131,6 +132,10 @@ contains
       end associate
       ! Rows that are still to come count with the others.
       if (.not. case%sweep%refine) call describe(case, self%strategy, run)
+      select type (source => self%source)
+      type is (several_source)
+         call source%summarize(case, run%summary)
+      end select
       if (run%explains .and. .not. run%state%was_stopped) then
          call explain(self%failures, case, run, error)
          if (allocated(error)) return
@@ -357,6 +362,7 @@ contains
       integer, intent(out) :: n_points
       type(branch_source), allocatable :: branch
       type(list_source) :: list
+      type(several_source), allocatable :: several
       type(vibration_branch), allocatable :: curve
       logical :: along_branch
 
@@ -371,6 +377,12 @@ contains
             return
          end if
       type is (one_level)
+         if (case%solver%n_solutions > 1) then
+            allocate (several)
+            several%strategy => strategy
+            call move_alloc(several, source)
+            return
+         end if
          ! A linear structure leaves no unknowns, and no branch that could turn back; nor does a
          ! structure at rest.
          along_branch = analyses(case%analysis)%is_sweep .and. strategy%level%system%n > 0 .and. &

@@ -6,7 +6,7 @@ module fw_run_ringdown
    use fw_analysis, only: analysis, run_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_case, only: analysis_mode, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_failure, status_input
    use fw_free_decay, only: bring_to_start, find_extremes, integrate_decay
    use fw_guess, only: stuck_guess
@@ -117,7 +117,7 @@ contains
 
       allocate (still, source=case)
       ! Nothing is condensed, nor left out because no load moves it.
-      still%analysis = analysis_mode
+      still%analysis = findloc(analyses%is_free, .true., dim=1)
       still%harmonics = harmonics_options()
       still%harmonics%n_harmonics = max(1, case%model%waves%highest())
       still%sweep%start = order_of_frequency(case)

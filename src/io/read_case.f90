@@ -263,6 +263,7 @@ contains
                               harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &
                               .not. case%output%histories .and. &
                               case%contact%memory /= memory_carried .and. &
+                              case%solver%n_solutions == 1 .and. &
                               100.0_wp*case%solver%tolerance <= usual_accuracy
       end associate
    end function goes_with_accuracy

@@ -40,6 +40,10 @@ module fw_solver_options
    integer, parameter :: continuation_natural = 1, continuation_arclength = 2
    !> Points of a sweep at most: a number that is larger was not meant, and its rows fill a disk.
    integer, parameter :: most_points = 10000000
+   !> Solutions of a point, power and shift: each solution found costs searches beside all others;
+   !> beyond these a factor is nothing but steep, or nothing but constant.
+   integer, parameter :: most_solutions = 1000
+   real(wp), parameter :: most_power = 8.0_wp, most_shift = 1000.0_wp
 
    !> Options of a nonlinear solution (group &solver).
    type :: solver_options
@@ -57,6 +61,10 @@ module fw_solver_options
       logical :: fallback = .true.
       !> Leave out work that a case does not need (stuck pairs, components that nothing moves).
       logical :: skips = .true.
+      !> Solutions of one point at most, and how those that are known repel the search for further
+      !> ones (fw_deflation).
+      integer :: n_solutions = 1
+      real(wp) :: deflation_power = 2.0_wp, deflation_shift = 1.0_wp
    contains
       procedure :: bind_keys => bind_solver_keys
    end type solver_options
@@ -129,6 +137,15 @@ contains
       call keys%bind(key('fallback', 'try other ways where the first guess fails'), self%fallback)
       call keys%bind(key('skips', 'leave out stuck pairs and components that nothing moves'), &
                      self%skips)
+      call keys%bind(key('n_solutions', 'solutions of the point at most, which become rows by '// &
+                         'rising amplitude; above 1 further ones are searched for by deflation', &
+                         from_to(1, most_solutions), only="analysis = 'point'"), self%n_solutions)
+      call keys%bind(key('deflation_power', 'power of the distance by which known solutions '// &
+                         'repel', from_to(1.0_wp, most_power), only='n_solutions > 1'), &
+                     self%deflation_power)
+      call keys%bind(key('deflation_shift', 'of the factor that repels, far from all known '// &
+                         'solutions', from_to(0.0_wp, most_shift), only='n_solutions > 1'), &
+                     self%deflation_shift)
    end subroutine bind_solver_keys
 
    !> The keys of group &pseudo_time.
