@@ -11,14 +11,16 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fretwear.plot.style import PALETTE
+
 __all__ = ["COLOURS", "finish", "microseconds", "milliseconds", "new_figure", "sentence",
            "table", "unwrapped", "wrapped"]
 
 #: Widest line of text; tables and pictures are as wide as they are.
 WIDTH = 120
 
-#: Lines of a picture, in this order; apart in brightness too.
-COLOURS = ("#1f4e79", "#c0392b", "#54a24b", "#f58518", "#7f4fa3", "#4c9aa8")
+#: Lines of a picture, in this order: those of the package.
+COLOURS = PALETTE
 
 
 def new_figure() -> tuple[Figure, Axes]:

@@ -1,6 +1,6 @@
 """Figures of the shrouded disk: tables and pictures of docs/shrouded_disk.md.
 
-    python -m bench.disk [--build build/release] [-o docs/shrouded_disk.md]
+    python -m bench.disk [--build build/release] [--pictures] [-o docs/shrouded_disk.md]
 """
 
 from __future__ import annotations
@@ -78,27 +78,48 @@ def frequencies(result: Result) -> list[str]:
     return [*lines, ""]
 
 
+def window(load: float, *, is_up: bool = False) -> tuple[str, ...]:
+    """Settings of the sweep under a load; down, from where the shrouds are shut. Narrow peaks
+    need more points."""
+    first, last, n = (1300.0, 1240.0, 241) if load < 5.0 else (1400.0, 600.0, 401)
+    return sweep(last, first, n) if is_up else sweep(first, last, n)
+
+
+def limits(run: Run) -> tuple[Result, Result]:
+    """Linear sweeps, with all pairs closed and with all open."""
+    return (run("linear", "wave.nml", *sweep(1280, 1292, 241), *TINY),
+            run("open", "wave.nml", *sweep(386, 390, 161), *TINY, "contact%gap=1"))
+
+
+def sweeps_of(run: Run, n_harmonics: int, *, is_up: bool = False) -> list[Result]:
+    """One sweep for each load."""
+    way = "up" if is_up else "down"
+    return [run(f"{way}_{n_harmonics}_{load:g}", "wave.nml", *window(load, is_up=is_up),
+                f"harmonics%n_harmonics={n_harmonics}", f"load%harmonic_scale={load}")
+            for load in LOADS]
+
+
+def draw_damping(run: Run, down: list[Result]) -> Figure:
+    """Peaks with one harmonic of sweeps down and up, between the linear limits."""
+    names = "pairs closed", "pairs open"
+    return plot_damping(down, upwards=sweeps_of(run, 1, is_up=True),
+                        linear=list(zip(names, limits(run))))
+
+
 def damping(run: Run) -> tuple[list[str], list[Result]]:
     """Peaks with one and with five harmonics, and the sweeps with one."""
-    rows: dict[int, list[Result]] = {1: [], 5: []}
-    for n, results in rows.items():
-        for load in LOADS:
-            # Down, from where the shrouds are shut; narrow peaks need more points.
-            where = sweep(1300, 1240, 241) if load < 5.0 else sweep(1400, 600, 401)
-            results.append(run(f"damping_{n}_{load:g}", "wave.nml", *where,
-                               f"harmonics%n_harmonics={n}", f"load%harmonic_scale={load}"))
+    rows = {n: sweeps_of(run, n) for n in (1, 5)}
+    linear, opened = limits(run)
     lines = ["", "| load [N] | H = 1: tip/load [mm/N] | at [Hz] "
              "| H = 5: tip/load | at [Hz] | converged |", "|---" * 6 + "|"]
-    linear = run("linear", "wave.nml", *sweep(1280, 1292, 241), *TINY)
-    size, at = read_damping([linear])[0, 2:]
+    size, at = read_damping([linear])[0, 2:4]
     lines.append(f"| linear, closed | {size:.2e} | {at:.1f} |  |  |  |")
     for one, five in zip(rows[1], rows[5]):
         first, second = read_damping([one])[0], read_damping([five])[0]
         lines.append(f"| {first[0]:g} | {first[2]:.2e} | {first[3]:.0f} "
                      f"| {second[2]:.2e} | {second[3]:.0f} "
                      f"| {five.converged.sum()} of {five.n_points} |")
-    opened = run("open", "wave.nml", *sweep(386, 390, 161), *TINY, "contact%gap=1")
-    size, at = read_damping([opened])[0, 2:]
+    size, at = read_damping([opened])[0, 2:4]
     lines.append(f"| linear, open | {size:.2e} | {at:.1f} |  |  |  |")
     return [*lines, ""], rows[1]
 
@@ -112,7 +133,7 @@ def wear(run: Run, folder: Path) -> tuple[list[str], Result]:
     for row in sorted({0, n // 4, n // 2, 3 * n // 4, n - 1}):
         found = run(f"worn_{row}", "wave.nml", *sweep(1300, 1100, 401),
                     f"contact%worn='{folder / 'wear.h5'}'", f"contact%worn_step={row + 1}")
-        size, at = read_damping([found])[0, 2:]
+        size, at = read_damping([found])[0, 2:4]
         depth, press = worn.depth[row], -worn.force[row, 0, :, 2]
         lines.append(f"| {worn.cycles[row]:.2e} | {depth[:2].mean():.1e} | {depth[2:].mean():.1e} "
                      f"| {press[:2].sum():.0f} | {press[2:].sum():.0f} | {at:.1f} | {size:.2e} |")
@@ -124,6 +145,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, default=ROOT / "build" / "release")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "shrouded_disk.md")
+    parser.add_argument("--pictures", action="store_true",
+                        help="draw the pictures again and leave the tables")
     options = parser.parse_args()
     images = options.output.parent / "images"
 
@@ -135,17 +158,24 @@ def main() -> int:
         run = runner(options.build.absolute() / "fw_run", folder)
         modes = [run(f"modes_{speed:g}", "wave.nml", "case%analysis=modes",
                      f"model%rotation_speed={speed}") for speed in SPEEDS]
-        write_section("frequencies", frequencies(modes[0]), options.output)
+        if not options.pictures:
+            write_section("frequencies", frequencies(modes[0]), options.output)
         draw("nodal_diameters", plot_nodal_diameters(modes[0]))
         draw("safe", plot_safe(modes[1]))
         draw("campbell", plot_campbell(modes, 4))
-        lines, sweeps = damping(run)
-        write_section("damping", lines, options.output)
-        draw("damping", plot_damping(sweeps))
+        if options.pictures:
+            down = sweeps_of(run, 1)
+        else:
+            lines, down = damping(run)
+            write_section("damping", lines, options.output)
+        draw("damping", draw_damping(run, down))
         wave = run("wave", "wave.nml")
         draw("wave", plot_wave(wave, int(np.abs(wave.harmonic(1)).argmax())))
-        lines, worn = wear(run, folder)
-        write_section("wear", lines, options.output)
+        if options.pictures:
+            worn = run("wear", "wear.nml")
+        else:
+            lines, worn = wear(run, folder)
+            write_section("wear", lines, options.output)
         draw("wear", plot_wear_evolution(worn))
     return 0
 

@@ -116,7 +116,8 @@ def draw_sweeps(path: Path, sweeps: dict[tuple[str, int], Run]) -> None:
     """One panel for each H."""
     harmonics = sorted({h for _, h in sweeps})
     figure = Figure(figsize=(8.4, 6.0), dpi=130, layout="constrained")
-    panels = figure.subplots(math.ceil(len(harmonics) / 2), 2, sharex=True, squeeze=False)
+    panels = figure.subplots(math.ceil(len(harmonics) / 2), 2, sharex=True, sharey=True,
+                             squeeze=False)
     for axes, h in zip(panels.flat, harmonics):
         for method, colour, style, name in (("hbm", COLOURS[0], "-", f"HBM, {INSTANTS} instants"),
                                             ("hdhb", COLOURS[1], "o--", "HDHB, 2H+1 instants")):
@@ -126,6 +127,7 @@ def draw_sweeps(path: Path, sweeps: dict[tuple[str, int], Run]) -> None:
                       markersize=3, linewidth=1.2, label=name)
         axes.set_title(f"H = {h}", fontsize=10)
         axes.grid(alpha=0.3)
+        axes.set_ylim(bottom=0.0)
     for axes in panels[-1]:
         axes.set_xlabel("frequency [Hz]")
     for axes in panels[:, 0]:

@@ -133,6 +133,10 @@ def error_text(value: float) -> str:
     return "not converged" if math.isnan(value) else f"{value:.1e}"
 
 
+#: Errors below this are drawn at it: round-off needs no decades of its own.
+EXACT = 1e-12
+
+
 def draw(path: Path, errors: dict[tuple[str, float, int], float]) -> None:
     """Error against H, one panel for each frequency."""
     figure = Figure(figsize=(9.0, 3.6), dpi=130, layout="constrained")
@@ -140,12 +144,12 @@ def draw(path: Path, errors: dict[tuple[str, float, int], float]) -> None:
     for axes, omega in zip(panels, FREQUENCIES):
         for curve, colour, style in zip(CURVES, COLOURS, ("o-", "s--", "^:", "v-.")):
             found = sorted((h, e) for (c, o, h), e in errors.items() if (c, o) == (curve, omega))
-            axes.plot([h for h, _ in found], [e for _, e in found], style, color=colour,
+            axes.plot([h for h, _ in found], [max(e, EXACT) for _, e in found], style, color=colour,
                       markersize=4, label=curve)
         axes.set(yscale="log", xlabel="harmonics H")
         axes.set_title(f"omega = {omega:g}", fontsize=10)
         axes.grid(alpha=0.3)
-    panels[0].set_ylabel("relative error")
+    panels[0].set_ylabel("relative error (1e-12: or less)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4,
                   frameon=False)
     figure.savefig(path)

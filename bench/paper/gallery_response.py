@@ -102,6 +102,7 @@ def draw_curves(path: Path, data: Response) -> None:
             axes.plot(cell.run.omega[good] / (2.0 * np.pi), cell.run.amplitude[good, 0], style,
                       color=colour, markersize=3, linewidth=1.4, label=METHODS[method])
         axes.set_title(f"H = {h}", fontsize=10)
+        axes.set_ylim(bottom=0.0)
         tidy(axes)
     for axes in panels[-1]:
         axes.set_xlabel("frequency [Hz]")

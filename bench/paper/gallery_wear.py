@@ -116,6 +116,10 @@ def write_wear(folder: Path, data: Wear) -> str:
         *beside(*tip_rows(data))])
 
 
+#: Runs that stand side by side as bars; of more each is a curve over the pairs.
+MOST_BARS = 3
+
+
 def draw_profiles(path: Path, runs: dict[str, WearRun],
                   starts: Mapping[str, Floats] | None = None) -> None:
     """Bars of every pair, a panel for each flank; on top of what the runs started from."""
@@ -125,14 +129,21 @@ def draw_profiles(path: Path, runs: dict[str, WearRun],
     figure = new_figure(9.0, 2.5 * len(names) + 0.7)
     panels = figure.subplots(len(names), 1, sharey=True, squeeze=False).ravel()
     width = 0.84 / len(runs)
+    as_bars = len(runs) <= MOST_BARS
     for axes, name in zip(panels, names):
         pairs = np.flatnonzero(patch == name)
         for k, (title, run) in enumerate(runs.items()):
             profile = run.depth + (starts[title] if starts else 0.0)
+            if not as_bars:
+                axes.plot(pairs + 1, 1e3 * profile[pairs], ("-", "--", "-.", ":", "-")[k % 5],
+                          marker="osD^vP"[k % 6], markersize=4, linewidth=1.0,
+                          color=PALETTE[k % len(PALETTE)], label=title)
+                continue
             axes.bar(pairs + 1 + (k - 0.5 * (len(runs) - 1)) * width, 1e3 * profile[pairs],
                      width, color=PALETTE[k % len(PALETTE)], label=title)
         axes.set_title(name, fontsize=10, loc="left")
         axes.set_ylabel("wear depth [µm]")
+        axes.set_ylim(bottom=0.0)
         axes.set_xlim(pairs[0] + 0.4, pairs[-1] + 1.6)
         axes.set_xticks(pairs[::2] + 1)
         tidy(axes)

@@ -147,6 +147,10 @@ def order(limits: list[Limit], name: str, sampling: str) -> str:
     return f"{-slope:.1f}"
 
 
+#: Distances below this are drawn at it: round-off needs no decades of its own.
+EXACT = 1e-10
+
+
 def draw(path: Path, limits: list[Limit], names: list[str]) -> None:
     """One panel for each case."""
     figure = Figure(figsize=(10.5, 6.2), dpi=130, layout="constrained")
@@ -155,15 +159,14 @@ def draw(path: Path, limits: list[Limit], names: list[str]) -> None:
         for sampling, mark, colour in zip(SAMPLINGS, ("o-", "s-"), COLOURS):
             found = [limit for limit in limits if (limit.case, limit.sampling) == (name, sampling)
                      and not math.isnan(limit.seconds)]
-            axes.plot([limit.n_time for limit in found], [max(limit.error, 1e-16)
-                                                          for limit in found],
+            axes.plot([limit.n_time for limit in found], [max(limit.error, EXACT) for limit in found],
                       mark, color=colour, markersize=4, linewidth=1.1, label=sampling)
         axes.set(xscale="log", yscale="log")
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_title(sentence(name), fontsize=10)
         axes.grid(alpha=0.3)
     for axes in panels[:, 0]:
-        axes.set_ylabel("distance from the limit")
+        axes.set_ylabel("distance from the limit\n(1e-10: or less)")
     for axes in panels[-1, :]:
         axes.set_xlabel("n_time")
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2,

@@ -188,6 +188,10 @@ def is_usable(sample: Sample | None) -> bool:
     return sample is not None and not math.isnan(sample.seconds)
 
 
+#: Errors below this are drawn at it: what is exact to round-off needs no decades of its own.
+EXACT = 1e-10
+
+
 def draw(path: Path, data: Precision, names: list[str]) -> None:
     """One panel for each case."""
     columns = min(3, len(names))
@@ -200,12 +204,18 @@ def draw(path: Path, data: Precision, names: list[str]) -> None:
             found = [s for s in data.samples
                      if (s.case, s.setting) == (name, setting) and is_usable(s)]
             if found or len(names) > 1:
-                axes.plot([1e3 * s.seconds for s in found], [s.error for s in found], mark,
+                axes.plot([1e3 * s.seconds for s in found], [max(s.error, EXACT) for s in found], mark,
                           color=colour, markersize=4, linewidth=1.1, label=setting)
         kept = [k for k in data.kept if k.case == name and k.estimate <= k.accuracy]
-        axes.plot([1e3 * k.seconds for k in kept], [k.error for k in kept], "*", color="black",
+        axes.plot([1e3 * k.seconds for k in kept], [max(k.error, EXACT) for k in kept], "*", color="black",
                   markersize=8, label="accuracy 1e-2, 1e-3, 1e-4")
         axes.set(xscale="log", yscale="log")
+        if min((line.get_ydata().min() for line in axes.lines if len(line.get_ydata())),
+               default=1.0) <= EXACT:
+            axes.set_ylim(bottom=0.4 * EXACT)
+            axes.axhline(EXACT, color="0.6", linestyle=":", linewidth=0.8)
+            axes.annotate("at most", (0.02, EXACT), xycoords=("axes fraction", "data"), fontsize=7,
+                          color="0.4", va="bottom")
         axes.xaxis.set_major_locator(LogLocator(numticks=5))
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_title(sentence(name), fontsize=10)

@@ -157,6 +157,9 @@ def draw_points(path: Path, points: list[PointTime]) -> None:
     axes.set(xscale="log", yscale="log", xlabel="harmonics H", ylabel="time of a point [ms]")
     axes.set_xticks(SECTOR_HARMONICS, [str(h) for h in SECTOR_HARMONICS], minor=False)
     axes.minorticks_off()
+    left_out = [p for p in points if p.linear == "lu" and not p.run]
+    if left_out:
+        axes.set_title(f"LU is not run for more than {LARGEST_LU} unknowns", fontsize=9, loc="left")
     finish(figure, axes, path)
 
 

@@ -222,6 +222,8 @@ def plot_comparison(first: Source, second: Source, observe: str | None = None) -
         _draw_cycles(upper, lower, a, b, observe)
     upper.legend(frameon=False)
     lower.axhline(0.0, color="0.4", linewidth=0.8)
+    first_name, second_name = _names(a, b)
+    lower.set_title(f"difference: {second_name} minus {first_name}", fontsize=9, loc="left")
     for axes in (upper, lower):
         tidy(axes)
     return figure

@@ -93,7 +93,7 @@ def test_no_period_of_the_contact(fluttering: fw.Result) -> None:
 def test_picture(fluttering: fw.Result, tmp_path: Path) -> None:
     upper, lower = plot_mode(fluttering).axes
     assert upper.get_xscale() == "log"
-    np.testing.assert_array_equal(upper.lines[0].get_ydata(), fluttering.mode.omega)
+    np.testing.assert_array_equal(upper.lines[0].get_ydata(), fluttering.mode.frequency)
     np.testing.assert_array_equal(lower.lines[0].get_ydata(), fluttering.mode.damping_ratio)
     assert upper.lines[1].get_xdata()[0] == pytest.approx(0.5)
     assert [text.get_text() for text in lower.get_legend().get_texts()] == [

@@ -394,6 +394,21 @@ def test_the_table_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     # The run without a number is left out.
     assert np.array_equal(second.get_xydata(), [[0.1, 5.0], [0.2, 4.0]])
     assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["1.0", "2.0"]
+    many = np.repeat(np.arange(1.0, 9.0), 3)
+    write_table({**{name: np.resize(column, 24) for name, column in table.items()},
+                 "contact%mu": np.tile([0.1, 0.2, 0.3], 8), "load%harmonic_scale": many,
+                 "max_amplitude[tip]": many}, tmp_path / "grid.h5", "study")
+    # More values than colours are curves all the same, each with its name.
+    grid = plot_table("grid.h5", ["max_amplitude[tip]"]).axes[0]
+    names = [text.get_text() for text in grid.get_legend().get_texts()]
+    # Along the number that varies most, a curve for each of the three others.
+    assert names == ["0.1", "0.2", "0.3"] and len(grid.lines) == 3
+    write_table({**{name: np.resize(column, 24) for name, column in table.items()},
+                 "contact%mu": np.linspace(0.1, 0.3, 24),
+                 "load%harmonic_scale": np.linspace(2.0, 1.0, 24),
+                 "max_amplitude[tip]": many}, tmp_path / "sample.h5", "study")
+    sample, bar = plot_table("sample.h5", ["max_amplitude[tip]"]).axes
+    assert bar.get_ylabel() == "load%harmonic_scale" and len(sample.collections[0].get_array()) == 24
     assert main(["plot", "study.h5"]) == 0
     assert Path("study.png").read_bytes().startswith(b"\x89PNG")
     assert main(["plot", "study.h5", "--kind", "response"]) == 3

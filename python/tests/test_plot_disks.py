@@ -91,8 +91,10 @@ def test_wave_over_the_sectors(wave: Result) -> None:
     first = axes.lines[0]
     column = wave.index("u6")
     expected = [wave.sector(j)[1, :, column] for j in range(8)]
-    # At phase 0 the cosines add up.
-    assert first.get_ydata() == pytest.approx([c[0] + c[1::2].sum() for c in expected])
+    # At phase 0 the cosines add up, about the mean, which is said below the picture.
+    assert first.get_ydata() == pytest.approx([c[1::2].sum() for c in expected])
+    assert axes.get_ylabel().startswith("u6 about its mean")
+    assert any("mean, left out" in text.get_text() for text in axes.texts)
     assert np.asarray(first.get_ydata())[7] == pytest.approx(np.asarray(first.get_ydata())[0])
     assert "towards lower sectors" in axes.get_title()  # engine order 5 of 7 sectors
 
@@ -106,6 +108,12 @@ def test_campbell_diagram(modes: Result, folder: Path) -> None:
         [r["modes/open"][4, 0] / (2.0 * np.pi) for r in (slow, modes)])
     # The blades stiffen as they are pulled.
     assert first.get_ydata()[1] > 1.003 * first.get_ydata()[0]
+    rings = next(line for line in axes.lines if line.get_label() == "crossing")
+    # Where an engine order that excites 4 nodal diameters of 36 sectors meets a frequency.
+    speed, hertz = np.asarray(rings.get_xdata()) / 60.0, np.asarray(rings.get_ydata())
+    assert len(speed) and all(round(float(f / s)) in (4, 32) for s, f in zip(speed, hertz))
+    assert hertz / speed == pytest.approx(np.round(hertz / speed))
+    assert {text.get_text() for text in axes.texts} >= {"EO 1", "EO 2", "EO 4"}
     with pytest.raises(InputError, match="one rotation speed"):
         plot_campbell([slow, slow])
     with pytest.raises(InputError, match="among 0 to 18"):

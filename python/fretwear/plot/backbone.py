@@ -23,6 +23,7 @@ from .style import (
     tidy,
     units_of,
 )
+from .together import told_apart
 
 __all__ = ["plot_backbone"]
 
@@ -62,16 +63,18 @@ def plot_backbone(sources: Source | Sequence[Source], observe: str | None = None
                          + ", ".join(one or "not known" for one in units))
     figure = new_figure(8.0, 5.0)
     axes = figure.subplots()
-    for k, result in enumerate(one for one in results if "mode/damping_ratio" not in one):
+    sweeps = [one for one in results if "mode/damping_ratio" not in one]
+    for k, (result, text) in enumerate(zip(sweeps, told_apart(sweeps))):
         amplitude = np.where(result.converged, np.abs(result.harmonic(1, name)), np.nan)
         axes.plot(result.frequency, amplitude, "-", marker=".", markersize=3.0, linewidth=1.1,
-                  color=PALETTE[1 + k % (len(PALETTE) - 1)], label=Path(result.name).stem)
+                  color=PALETTE[1 + k % (len(PALETTE) - 1)], label=text)
     heights = [_draw_mode(axes, result, name, with_name=len(modes) > 1) for result in modes]
     _limit(axes, np.concatenate(heights), units[0], name)
     axes.set_xlabel("frequency [Hz]")
     axes.ticklabel_format(axis="x", useOffset=False)
     tidy(axes)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3,
+                borderaxespad=0.0)
     return figure
 
 
@@ -87,10 +90,12 @@ def _draw_mode(axes: Axes, result: Result, name: str, *, with_name: bool) -> Flo
         for k, scale in enumerate(result["synthesis/scale"]):
             for part, (x, y) in enumerate(_responses(result, k, amplitude)):
                 axes.plot(x / (2.0 * np.pi), y, "--", color="0.35", linewidth=1.0,
-                          label="put together from it, times the load" if k + part == 0 else None)
+                          label="synthesis from the mode, at the load factor" if k + part == 0
+                          else None)
                 top = int(np.nanargmax(y))
-                axes.annotate(f"{scale:g}", (x[top] / (2.0 * np.pi), y[top]), fontsize=7,
-                              textcoords="offset points", xytext=(0, 5), color="0.35")
+                axes.annotate(f"{scale:g}", (x[top] / (2.0 * np.pi), y[top]), fontsize=8,
+                              textcoords="offset points", xytext=(0, 5), color="0.35",
+                              ha="center")
     return np.asarray(amplitude[np.isfinite(amplitude)])
 
 

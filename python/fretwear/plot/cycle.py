@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -39,6 +40,8 @@ _INSTANTS = 256
 _ROUND_OFF = 1e-13
 #: Pairs drawn unless others are asked for.
 _MOST_PAIRS = 6
+#: Half the width of the panels of all loops, over the extent of the largest.
+_MARGIN = 0.55
 
 
 def _cycle_of(result: Result, point: int | None, pairs: Sequence[int] | None) -> Cycle:
@@ -129,9 +132,16 @@ def plot_hysteresis(source: Source, point: int | None = None,
     # One unit for all panels, so that they can be compared.
     moved = largest_of(*(line.get_xdata() for axes in panels for line in axes.lines))
     pressed = largest_of(*(line.get_ydata() for axes in panels for line in axes.lines))
+    # Of all loops about their own middle, so that sizes and shapes can be compared.
+    wide = max((float(np.ptp(loop.displacement)) for loop in loops if loop.moves), default=0.0)
+    high = max((float(np.ptp(loop.force)) for loop in loops), default=0.0)
     for axes, loop in zip(panels, loops):
         if not loop.moves:
             _room(axes, float(loop.displacement[0]), moved)
+        else:
+            _same_extent(axes.set_xlim, loop.displacement, wide)
+        if high > 0.0:
+            _same_extent(axes.set_ylim, loop.force, high)
         length = scale_axis(axes.xaxis, moved, units_of(result, "amplitude"))
         force = scale_axis(axes.yaxis, pressed, units_of(result, "contact/force"))
         axes.locator_params(axis="x", nbins=5)
@@ -141,6 +151,13 @@ def plot_hysteresis(source: Source, point: int | None = None,
     figure.supylabel(label("contact force", force), fontsize=10)
     figure.suptitle(f"Hysteresis at {_at(result, point, cycle)}", fontsize=11)
     return figure
+
+
+def _same_extent(set_limits: Callable[[float, float], Any], values: Floats,
+                 extent: float) -> None:
+    """Limits of one width for all panels, about the middle of what one of them shows."""
+    middle = 0.5 * float(values.min() + values.max())
+    set_limits(middle - _MARGIN * extent, middle + _MARGIN * extent)
 
 
 def _room(axes: Axes, middle: float, extent: float) -> None:

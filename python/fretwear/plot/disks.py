@@ -22,6 +22,7 @@ from .style import (
     label,
     largest_of,
     new_figure,
+    scale,
     scale_axis,
     tidy,
     units_of,
@@ -33,6 +34,10 @@ __all__ = ["folded", "plot_nodal_diameters", "plot_safe", "plot_wave", "rotation
 _BEHIND = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
 #: Phases of the period at which the wave is drawn [turns].
 _PHASES = (0.0, 0.125, 0.25, 0.375)
+#: An engine order is near a frequency within this part of it.
+_NEAR = 0.01
+#: Room above the families of the middle nodal diameter.
+_ROOM = 1.6
 
 
 def rotation_speed(result: Result) -> float:
@@ -97,8 +102,9 @@ def plot_safe(source: Source, speed: float | None = None) -> Figure:
     fold = np.abs((place + 0.5 * n) % n - 0.5 * n)
     axes.plot(fold, place * hertz, "-", color="0.45", linewidth=1.0)
     axes.plot(folded(orders, n), orders * hertz, "s", color="0.25", markersize=4.0)
+    _draw_resonances(axes, result, orders, hertz)
     for order in orders[1:]:
-        if order % max(1, n // 4) == 0:
+        if order % max(1, n // 4) == 0 and order * hertz < 0.96 * top:
             axes.annotate(f"EO {order}", (folded(np.array([order]), n)[0], order * hertz),
                           xytext=(0, 8), textcoords="offset points", fontsize=8, color="0.25",
                           ha="center", bbox=_BEHIND)
@@ -106,6 +112,21 @@ def plot_safe(source: Source, speed: float | None = None) -> Figure:
     axes.set_title(f"Engine orders at {speed:.5g} rad/s ({60.0 * hertz:.5g} rpm), folded at "
                    f"nodal diameter {n // 2}", fontsize=11)
     return figure
+
+
+def _draw_resonances(axes: Axes, result: Result, orders: NDArray[np.int_], hertz: float) -> None:
+    """Rings on engine orders that come near a frequency of the nodal diameter that they excite."""
+    known = result["modes/nodal_diameter"].astype(int).tolist()
+    for state, colour in (("open", PALETTE[5]), ("closed", CURVE)):
+        if f"modes/{state}" not in result:
+            continue
+        near = [(k, order * hertz) for order in orders[1:]
+                if (k := int(folded(np.array([order]), _sectors(result))[0])) in known
+                and np.nanmin(np.abs(result[f"modes/{state}"][known.index(k)]
+                                     / (2.0 * np.pi * order * hertz) - 1.0)) < _NEAR]
+        if near:
+            axes.plot(*np.transpose(near), "o", color=colour, markerfacecolor="none",
+                      markersize=10, markeredgewidth=1.5, linestyle="none", zorder=5)
 
 
 def plot_wave(source: Source, point: int | None = None, observe: str | None = None) -> Figure:
@@ -131,9 +152,14 @@ def plot_wave(source: Source, point: int | None = None, observe: str | None = No
     tau = 2.0 * np.pi * np.arange(256) / 256
     waves = np.array([result.sector(j)[point, :, column % width] for j in range(n + 1)])
     history = waves @ synthesis(waves.shape[1], tau)
+    # What does not vibrate would take the picture: its value is said beside.
+    mean = waves[:, 0].copy()
+    waves[:, 0] = 0.0
+    history -= mean[:, None]
     figure = new_figure(8.6, 4.6)
     axes = figure.subplots()
-    axes.fill_between(sectors, history.min(axis=1), history.max(axis=1), color="0.92", zorder=0)
+    axes.fill_between(sectors, history.min(axis=1), history.max(axis=1), color="0.92", zorder=0,
+                      label="range")
     for phase, colour in zip(_PHASES, PALETTE):
         instant = synthesis(waves.shape[1], np.array([2.0 * np.pi * phase]))[:, 0]
         axes.plot(sectors, waves @ instant, "-o", markersize=3.5, linewidth=1.2, color=colour,
@@ -141,9 +167,14 @@ def plot_wave(source: Source, point: int | None = None, observe: str | None = No
     axes.set_xlim(0, n)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("sector")
-    axes.set_ylabel(label(result.observed[column], scale_axis(
-        axes.yaxis, largest_of(history), units_of(result, "amplitude"))))
+    units = units_of(result, "amplitude")
+    axes.set_ylabel(label(f"{result.observed[column]} about its mean", scale_axis(
+        axes.yaxis, largest_of(history), units)))
     tidy(axes)
+    factor, own = scale(largest_of(mean), units)
+    low, high = (f"{factor * value:.4g}" for value in (mean.min(), mean.max()))
+    axes.text(0.0, -0.16, f"mean, left out: {low}" + (f" to {high}" if high != low else "")
+              + f" {own}".rstrip(), transform=axes.transAxes, fontsize=8, color="0.35")
     axes.legend(title="phase of\nthe period", frameon=False, fontsize=8, title_fontsize=8,
                 loc="center left", bbox_to_anchor=(1.0, 0.5))
     order = int(result.attributes["engine_order"])
@@ -174,18 +205,29 @@ def _draw_families(axes: Axes, result: Result) -> None:
     for state, style, colour in (("open", "o--", PALETTE[5]), ("closed", "o-", CURVE)):
         if f"modes/{state}" in result:
             values: Floats = result[f"modes/{state}"] / (2.0 * np.pi)
-            axes.plot(diameters, values, style, color=colour, markersize=3.5, linewidth=1.1)
-    # The families that all nodal diameters have, whatever the highest of one of them.
-    tops = [np.nanmax(result[f"modes/{state}"][:, :4], axis=1)
-            for state in ("open", "closed") if f"modes/{state}" in result]
-    finite = np.concatenate(tops)
-    axes.set_ylim(0.0, 1.05 * float(np.nanmedian(finite)) / (2.0 * np.pi))
+            # Thin: they join modes of one rank, and shapes change over where two come near.
+            axes.plot(diameters, values, style, color=colour, markersize=4.0, linewidth=0.6)
+    axes.set_ylim(0.0, 1.05 * _top(result) / (2.0 * np.pi))
+
+
+def _top(result: Result) -> float:
+    """The highest of the first four families, or of those that all nodal diameters have: what
+    climbs far above the others leaves them no room."""
+    states = [result[f"modes/{state}"][:, :4] for state in ("open", "closed")
+              if f"modes/{state}" in result]
+    tops = np.concatenate([np.nanmax(values, axis=1) for values in states])
+    return float(min(np.nanmax(tops), _ROOM * np.nanmedian(tops)))
 
 
 def _frame(axes: Axes, result: Result) -> None:
     handles = [Line2D([], [], color=PALETTE[5], linestyle="--", marker="o", markersize=3.5,
                       label="pairs open"),
                Line2D([], [], color=CURVE, marker="o", markersize=3.5, label="pairs closed")]
+    if any(line.get_markersize() == 10 for line in axes.lines):
+        handles += [Line2D([], [], color="0.25", marker="s", markersize=4.0, linewidth=1.0,
+                           label="engine orders"),
+                    Line2D([], [], color="0.25", marker="o", markersize=10, linestyle="none",
+                           markerfacecolor="none", label=f"within {100 * _NEAR:g} % of\na frequency")]
     axes.legend(handles=handles, frameon=False, fontsize=8, loc="center left",
                 bbox_to_anchor=(1.0, 0.5))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

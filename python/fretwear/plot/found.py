@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from ..design import Calibration, ControlData, Measured, ModeData, Optimum, ResponseData
@@ -17,6 +18,8 @@ __all__ = ["plot_calibration", "plot_optimum"]
 
 #: Half length of a tangent, as a part of the range of the parameter (or of its logarithm).
 _TANGENT = 0.06
+#: Places between two evaluations at which their curve is drawn.
+_BETWEEN = 16
 _FORCED = "damping ratio F/(2ma)"
 _NAMES = {"frequency": "frequency [Hz]", "damping_ratio": "damping ratio",
           "amplitude": "amplitude", "load": "load factor"}
@@ -44,6 +47,9 @@ def plot_optimum(found: Optimum) -> Figure:
         wide = bool(x.min() > 0.0 and x.max() > 5.0 * x.min())
         if wide:
             axes.set_xscale("log")
+        if n == 1:
+            axes.plot(*_curve(x, values, slopes[:, k], wide=wide), color="0.6", linewidth=1.2,
+                      label="through values and slopes")
         for one, value, slope in zip(x, values, slopes[:, k]):
             reach = _TANGENT * (np.log(x.max() / x.min()) * one if wide else np.ptp(x))
             ends = np.array([one - reach, one + reach])
@@ -60,6 +66,24 @@ def plot_optimum(found: Optimum) -> Figure:
         tidy(axes)
     panels[0].set_ylabel(found.objective)
     return figure
+
+
+def _curve(x: Floats, values: Floats, slopes: Floats, *, wide: bool) -> tuple[Floats, Floats]:
+    """Cubics between neighbours with their values and slopes, over the logarithm where wide."""
+    place, first = np.unique(np.log(x) if wide else x, return_index=True)
+    along = slopes[first] * (x[first] if wide else 1.0)
+    t = np.linspace(0.0, 1.0, _BETWEEN)
+    h00, h10 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * (1.0 - t) ** 2
+    found_x, found_y = [], []
+    for k in range(len(place) - 1):
+        step = place[k + 1] - place[k]
+        found_x.append(place[k] + step * t)
+        found_y.append(h00 * values[first][k] + h10 * step * along[k]
+                       + h00[::-1] * values[first][k + 1] - h10[::-1] * step * along[k + 1])
+    if not found_x:
+        return x, values
+    line = np.concatenate(found_x)
+    return np.exp(line) if wide else line, np.concatenate(found_y)
 
 
 def _clusters(x: Floats, y: Floats) -> Iterator[tuple[int, int]]:
@@ -119,10 +143,15 @@ def _draw(axes: Axes, one: Measured, rows: NDArray[np.bool_], predicted: Floats,
     assert x is not None  # there are no other kinds
     order = np.argsort(x)
     spread = one.deviation[rows][order] if one.is_known else None
-    axes.errorbar(x[order], one.values[rows][order], yerr=spread, fmt="o", markersize=4,
-                  color=FAILED if colour == CURVE else colour, capsize=2, linewidth=1.0,
+    axes.errorbar(x[order], one.values[rows][order], yerr=spread, fmt="o", markersize=3,
+                  color=FAILED if colour == CURVE else colour, capsize=5, capthick=1.2,
+                  linewidth=1.2, zorder=3,
                   label="measured" + (", one deviation" if one.is_known else ""))
     axes.plot(x[order], predicted[rows][order], color=CURVE, linewidth=1.4, label="calibrated")
     if isinstance(one, ModeData):
         axes.set_xscale("log")
+        # Numbers as they are read: 0.5, 1, 2, 5.
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel("amplitude")

@@ -49,7 +49,7 @@ def plot_mode(source: Source) -> Figure:
         raise InputError(f"{result.name}: no point of the mode has converged")
     figure = new_figure(8.0, 6.0)
     panels = figure.subplots(2, 1, sharex=True)
-    for axes, values in zip(panels, (mode.omega, mode.damping_ratio)):
+    for axes, values in zip(panels, (mode.frequency, mode.damping_ratio)):
         axes.plot(amplitude, values, color=CURVE, linewidth=1.6)
         if mode.onset > 0.0:
             axes.axvline(mode.onset, color=_ONSET, linestyle=":", linewidth=1.2,
@@ -61,11 +61,11 @@ def plot_mode(source: Source) -> Figure:
     for cycle in mode.limit_cycles:
         colour = _CYCLE[cycle.stable]
         name = f"{'stable' if cycle.stable else 'unstable'} limit cycle, {cycle.amplitude:.3g}"
-        for axes, height in zip(panels, (cycle.omega, 0.0)):
+        for axes, height in zip(panels, (cycle.omega / (2.0 * np.pi), 0.0)):
             axes.plot([cycle.amplitude], [height], "o", color=colour, markersize=7,
                       markerfacecolor=colour if cycle.stable else "white", label=name)
     panels[0].set_xscale("log")
-    panels[0].set_ylabel("frequency [rad/s]")
+    panels[0].set_ylabel("frequency [Hz]")
     panels[0].ticklabel_format(axis="y", useOffset=False)
     panels[1].set_ylabel("damping ratio of the mode, ξ/(2ω)")
     if mode.control == "modal":
@@ -78,6 +78,7 @@ def plot_mode(source: Source) -> Figure:
         # Above the panel, where it covers no curve.
         panels[1].legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0),
                          borderaxespad=0.0, ncols=2)
-    figure.suptitle(f"Nonlinear mode {mode.number}, {mode.stuck_omega:.6g} rad/s with stuck pairs",
+    figure.suptitle(f"Nonlinear mode {mode.number}, "
+                    f"{mode.stuck_omega / (2.0 * np.pi):.6g} Hz with stuck pairs",
                     fontsize=11)
     return figure

@@ -309,7 +309,7 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
     axes.set_ylim(0.0, 1.06 * largest or None)
     tidy(axes)
     axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0,
-                fontsize=9)
+                fontsize=9, ncols=1 if len(axes.get_legend_handles_labels()[1]) < 4 else 2)
     return largest
 
 
@@ -374,10 +374,10 @@ def _damping_words(response: Response, stuck: Response | None, modal_mass: float
     damping = friction_damping(response, stuck, modal_mass=modal_mass)
     if damping is not None:
         how = "its energy" if modal_mass is not None else "the heights of both peaks"
-        lines.append(f"damping ratio of friction {100.0 * damping:.4f} %, by {how}")
+        lines.append(f"damping ratio of friction {100.0 * damping:.3g} %, by {how}")
     elif not response.is_branch and np.isfinite(width := half_power_damping(response)):
         # Of a peak that friction bends to one side it is a width, and no damping.
-        lines.append(f"half-power width {200.0 * width:.4f} % of the frequency")
+        lines.append(f"half-power width {200.0 * width:.3g} % of the frequency")
     return lines
 
 

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..errors import InputError
+from .._native import namelist_values
+from ..errors import AbsentError, InputError, NotBuiltError
 from ..result import Result
 from .response import Response, read_response
 from .style import PALETTE, Source, as_result, label, new_figure, scale_axis, tidy
 
-__all__ = ["plot_envelope", "plot_responses"]
+__all__ = ["plot_envelope", "plot_responses", "told_apart"]
 
 
 def plot_responses(sources: Sequence[Source], observe: str | None = None) -> Figure:
@@ -96,6 +97,31 @@ def plot_envelope(sources: Sequence[Source], observe: str | None = None) -> Figu
     tidy(axes)
     axes.legend(frameon=False)
     return figure
+
+
+def told_apart(results: Sequence[Result]) -> list[str]:
+    """A name for each result: the one key in which their cases differ, with its value; the names
+    of the files where several keys differ, or none."""
+    names = _names([result.name for result in results])
+    if len(results) < 2:
+        return names
+    try:
+        cases = [namelist_values(result.namelist) for result in results]
+    except (AbsentError, NotBuiltError):
+        return names
+    keys = [key for key in dict.fromkeys(key for case in cases for key in case)
+            if not key.startswith("output%") and len({tuple(case.get(key, ())) for case in cases}) > 1]
+    if len(keys) != 1 or not all(len(case.get(keys[0], ())) == 1 for case in cases):
+        return names
+    return [f"{keys[0]} = {_number(case[keys[0]][0])}" for case in cases]
+
+
+def _number(text: str) -> str:
+    """A number of a namelist as it is read."""
+    try:
+        return f"{float(text):.6g}"
+    except ValueError:
+        return text
 
 
 def _read(sources: Sequence[Source], observe: str | None) -> tuple[list[Result], list[Response]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from ..errors import AbsentError, InputError
 from ..result import Result
@@ -14,13 +15,15 @@ from .style import (
     CURVE,
     FAILED,
     PALETTE,
+    Floats,
+    ScaledFormatter,
     Source,
     as_result,
     label,
-    label_y,
     largest_of,
     new_figure,
     pair_name,
+    scale,
     scale_axis,
     tidy,
     units_of,
@@ -118,7 +121,9 @@ def plot_wear_evolution(source: Source) -> Figure:
     panels = figure.subplots(n_panels, 1, sharex=True)
     worst = np.argsort(-depth[-1], kind="stable")[:_MOST_PAIRS]
     for k, pair in enumerate(sorted(int(pair) for pair in worst)):
-        panels[0].plot(cycles, depth[:, pair], ".-", color=PALETTE[k],
+        # Curves on top of each other are all seen: the later the thinner, with other dashes.
+        panels[0].plot(cycles, depth[:, pair], ("-", "--", "-.", ":", "-", "--")[k], marker=".",
+                       linewidth=2.4 - 0.25 * k, markersize=7.0 - 0.6 * k, color=PALETTE[k],
                        label=pair_name(result, pair))
     panels[0].set_ylabel(label("wear depth", scale_axis(
         panels[0].yaxis, largest_of(depth), units_of(result, "wear/depth"))))
@@ -128,12 +133,18 @@ def plot_wear_evolution(source: Source) -> Figure:
     # A joint that sticks has a rate of exactly zero, which has no place on a logarithmic axis.
     shown = np.where(largest > 0.0, largest, np.nan) if wears else largest
     panels[1].plot(cycles, shown, ".-", color=CURVE)
-    units = units_of(result, "wear/rate")
+    # In the unit of the depth above, so that one can be reckoned from the other.
+    units, factor = _rate_units(result, depth)
     if wears and np.nanmax(shown) > _DECADE * np.nanmin(shown):
         panels[1].set_yscale("log")
+        panels[1].yaxis.set_major_formatter(FuncFormatter(
+            lambda value, _: "" if value <= 0.0 else _power(factor * value)))
+        panels[1].yaxis.set_minor_formatter(NullFormatter())
         panels[1].set_ylabel(label("largest depth\nper cycle", units))
     else:
-        label_y(panels[1], "largest depth\nper cycle", units)
+        further, shown_units = scale(factor * largest_of(shown), units)
+        panels[1].yaxis.set_major_formatter(ScaledFormatter(factor * further))
+        panels[1].set_ylabel(label("largest depth\nper cycle", shown_units))
     if has_amplitude:
         failed = ~result.converged
         amplitude = np.where(failed, np.nan, result.amplitude[:, 0])
@@ -145,10 +156,14 @@ def plot_wear_evolution(source: Source) -> Figure:
             panels[2].legend(frameon=False, fontsize=8)
         panels[2].set_ylabel(label(f"amplitude\nof {result.observed[0]}", scale_axis(
             panels[2].yaxis, largest_of(amplitude), units_of(result, "amplitude"))))
+        panels[2].set_ylim(0.0, 1.08 * largest_of(amplitude) or None)
     positive = cycles[cycles > 0.0]
     if positive.size and positive[-1] > 100.0 * positive[0]:
         # The rate falls over decades of cycles; the start, at zero, stays in the picture.
-        panels[-1].set_xscale("symlog", linthresh=positive[0])
+        first = 10.0 ** np.ceil(np.log10(positive[0]))
+        panels[-1].set_xscale("symlog", linthresh=first, linscale=0.5)
+        panels[-1].set_xticks([0.0, *10.0 ** np.arange(np.log10(first), np.log10(cycles[-1]) + 1e-9)])
+        panels[-1].set_xlim(-0.02 * first, 1.3 * cycles[-1])
         abscissa = ""
     else:
         abscissa = scale_axis(panels[-1].xaxis, largest_of(cycles), "")
@@ -159,5 +174,31 @@ def plot_wear_evolution(source: Source) -> Figure:
         state = f", steady state {result.steady_state}"
     except AbsentError:  # the run is at work, or was killed
         state = ""
-    figure.suptitle(f"Wear over the cycles{state}", fontsize=11)
+    figure.suptitle(f"Wear over the cycles{state}{_duration(result)}", fontsize=11)
     return figure
+
+
+def _rate_units(result: Result, depth: Floats) -> tuple[str, float]:
+    """The unit in which depths are shown, for rates too, and the factor to it."""
+    units = units_of(result, "wear/rate")
+    if units != units_of(result, "wear/depth"):
+        return units, 1.0
+    factor, shown = scale(largest_of(depth), units)
+    return shown, factor
+
+
+def _power(value: float) -> str:
+    """A power of ten at a tick."""
+    return f"$10^{{{round(np.log10(value))}}}$"
+
+
+def _duration(result: Result) -> str:
+    """How long the cycles last at the frequency of the run, which tells whether they mean
+    anything; "" where they stand for something else."""
+    if _abscissa(result) != "cycles" or not len(result.frequency) or result.frequency[0] <= 0.0:
+        return ""
+    seconds = float(result.cycles[-1] / result.frequency[0])
+    for name, size in (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0)):
+        if seconds >= size:
+            return f"; the last cycle after {seconds / size:.2g} {name}"
+    return f"; the last cycle after {seconds:.2g} s"
