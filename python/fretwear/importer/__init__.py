@@ -74,6 +74,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=sorted(FORMATS), help="of all files; else found out")
     parser.add_argument("--mirror", action="store_true",
                         help="a matrix with one triangle only is symmetric")
+    parser.add_argument("--unsymmetric", action="store_true",
+                        help="an unsymmetric stiffness is meant, as of friction that slides: its "
+                             "skew part goes into /stiffness_unsymmetric")
     parser.add_argument("--mass-factor", type=float, default=1.0, metavar="X",
                         help="multiplies the mass, such as 1e-3 from kg to tonnes")
     parser.add_argument("--labels", type=Path, metavar="TABLE",
@@ -234,7 +237,8 @@ def _read(options: argparse.Namespace) -> FullModel:
     files = options.files if job is None else [
         job.dofs, *(path for path in options.files if find_job(path) is None)]
     model = gather(sources, files, format=options.format, mirror=options.mirror,
-                   mass_factor=options.mass_factor, labels=labels)
+                   mass_factor=options.mass_factor, labels=labels,
+                   unsymmetric=options.unsymmetric)
     model = replace(model, stress=_stress_of_rows(options, model),
                     speeds=read_speeds(options.at_speed, options.format, model, options.mirror))
     model, deck = _with_mesh(model, options, job)
