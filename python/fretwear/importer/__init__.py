@@ -133,9 +133,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--by-diameter", action="store_true",
                         help="reduce the sector on its own in every nodal diameter, without its "
                              "interfaces")
-    parser.add_argument("--blade", type=Path, metavar="TABLE",
-                        help="nodes of the blade above the disk (column node): its modes go into "
-                             "the file as rows, by which blades may differ (&mistuning)")
+    parser.add_argument("--blade", type=Path, metavar="SET|TABLE",
+                        help="nodes of the blade above the disk, a set of the mesh or a table "
+                             "(column node): its modes go into the file as rows, by which blades "
+                             "may differ (&mistuning)")
     parser.add_argument("--blade-modes", type=int, metavar="N",
                         help="how many modes of the blade (default: 5)")
     parser.add_argument("--stress-rows", type=Source.of, metavar="FILE[#NAME]",
@@ -169,6 +170,10 @@ def main(options: argparse.Namespace) -> int:
     found = [note if isinstance(note, Finding) else Finding("note", "files", note)
              for note in model.notes] + check_model(model, options.factor)
     wanted = _modes(options)
+    whole = model
+    if options.by_diameter and options.mesh is None:
+        # The mesh of a deck has found the cut faces; nodal diameters have no common one to show.
+        model = replace(model, mesh=None)
     wrong = [finding for finding in found if finding.kind == "error"]
     if not wrong and options.check is not None and wanted is not None:
         # Says what a reduction would refuse.
@@ -181,7 +186,7 @@ def main(options: argparse.Namespace) -> int:
     if options.check is not None:
         if picture is not None:
             order = 1 if options.engine_order is None else options.engine_order
-            for finding in draw_wheel(wheel_of(model, order), picture):
+            for finding in draw_wheel(wheel_of(whole, order), picture):
                 print(finding)
         print(f"no errors in {model.dofs.n} degrees of freedom, "
               f"{0 if model.pairs is None else len(model.pairs)} pairs")
