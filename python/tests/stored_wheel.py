@@ -31,16 +31,26 @@ class StoredWheel:
         Where they are written.
     held : bool
         Whether the bore is held, and has no rows.
+    seed : int, optional
+        Draws the number of sectors, the shape of the cut faces, the axis and the numbers of nodes.
     """
 
-    def __init__(self, folder: Path, held: bool = True) -> None:
-        half = np.pi / N_SECTORS
-        plain = MeshTet1.init_tensor(np.array([20.0, 32.0, 50.0]), np.linspace(-half, half, 3),
-                                     np.array([0.0, 9.0]))
+    def __init__(self, folder: Path, held: bool = True, seed: int | None = None) -> None:
+        random = np.random.default_rng(2 if seed is None else seed)
+        self.n_sectors, self.axis = N_SECTORS, "z"
+        rings, bend, tilt = np.array([20.0, 32.0, 50.0]), 0.004, 0.02
+        if seed is not None:
+            self.n_sectors, self.axis = int(random.integers(3, 8)), str(random.choice([*"xyz"]))
+            rings = np.cumsum([20.0, *random.uniform(6.0, 14.0, 2)])
+            bend, tilt = random.uniform(-0.01, 0.01), random.uniform(-0.04, 0.04)
+        half = np.pi / self.n_sectors
+        plain = MeshTet1.init_tensor(rings, np.linspace(-half, half, 3), np.array([0.0, 9.0]))
         radius, angle, height = plain.p
         # A cut face that is curved, and tilts along the axis: no plane through it.
-        angle = angle + 0.004 * (radius - 20.0) + 0.02 * height
-        mesh = MeshTet1(np.stack((radius * np.cos(angle), radius * np.sin(angle), height)), plain.t)
+        angle = angle + bend * (radius - 20.0) + tilt * height
+        # The axis and both directions across it, in the order of the right hand.
+        places = np.stack((radius * np.cos(angle), radius * np.sin(angle), height))
+        mesh = MeshTet1(np.roll(places, "zxy".index(self.axis), axis=0), plain.t)
         basis = Basis(mesh, ElementVector(ElementTetP2()), intorder=4)
         scalar = Basis(mesh, ElementTetP2(), intorder=4)
         lam, mu = lame_parameters(2.1e5, 0.3)
@@ -61,7 +71,7 @@ class StoredWheel:
         self.mass, self.stiffness = (sp.csr_array(form.assemble(basis))[rows][:, rows]
                                      for form in (mass, stiffness))
         self.points = scalar.doflocs.T.copy()
-        own = np.hypot(*self.points[:, :2].T)
+        own = np.hypot(*np.roll(self.points, -"zxy".index(self.axis), axis=1)[:, :2].T)
         self.bore = np.flatnonzero(own < 20.0 + 1e-6)
         # Middles of edges of the bore lie on chords.
         at = {tuple(np.round(p, _PLACE)): k for k, p in enumerate(self.points)}
@@ -74,11 +84,11 @@ class StoredWheel:
                                                          + self.points[cell[b]]), _PLACE))]
                                 for a, b in ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)))]
                       for cell in self.corners]
-        turned = self.points @ _turn(1).T
+        turned = self.points @ self.turn(1).T
         self.left = [k for k, p in enumerate(turned) if tuple(np.round(p, _PLACE)) in at]
         self.right = [at[tuple(np.round(turned[k], _PLACE))] for k in self.left]
         self.n_cut = len(set(self.left) - set(self.bore.tolist()))
-        self.nodes = 10 + 3 * np.random.default_rng(2).permutation(len(self.points))
+        self.nodes = 10 + 3 * random.permutation(len(self.points))
         self._write(folder, held)
 
     @staticmethod
@@ -87,14 +97,23 @@ class StoredWheel:
         """Names of rows."""
         return Dofs(len(labels), labels, sets=sets)
 
+    def turn(self, sectors: int) -> np.ndarray:
+        """Rotation by so many sectors."""
+        angle = 2.0 * np.pi * sectors / self.n_sectors
+        c, s = np.cos(angle), np.sin(angle)
+        about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        k = "zxy".index(self.axis)
+        found: np.ndarray = np.roll(np.roll(about_z, k, axis=0), k, axis=1)
+        return found
+
     def whole(self) -> np.ndarray:
         """Frequencies of the wheel of all sectors [rad/s], assembled in global components."""
         index: dict[tuple[float, ...], int] = {}
-        wholes = [sp.csr_array((3 * len(self.points) * N_SECTORS,) * 2) for _ in range(2)]
+        wholes = [sp.csr_array((3 * len(self.points) * self.n_sectors,) * 2) for _ in range(2)]
         held: set[int] = set()
         n = wholes[0].shape[0]
-        for sector in range(N_SECTORS):
-            turn = _turn(sector)
+        for sector in range(self.n_sectors):
+            turn = self.turn(sector)
             at = np.array([index.setdefault(tuple(np.round(p, _PLACE) + 0.0), len(index))
                            for p in self.points @ turn.T])
             held |= {3 * int(at[k]) + c for k in self.bore for c in range(3)}
@@ -134,9 +153,3 @@ class StoredWheel:
             + "*NSET, NSET=RIGHT\n" + named([k for k in self.right if k in corner])
             + "*NSET, NSET=BORE\n" + named(self.bore.tolist())
             + ("*BOUNDARY\nBORE, 1, 3\n" if held else ""))
-
-
-def _turn(sectors: int) -> np.ndarray:
-    angle = 2.0 * np.pi * sectors / N_SECTORS
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

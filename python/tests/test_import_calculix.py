@@ -165,24 +165,49 @@ def test_the_sector_by_hand_is_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sets", [[], ["--left", "LEFT", "--right", "RIGHT"]])
-def test_quadratic_sector_against_the_whole_wheel(tmp_path: Path, sets: list[str]) -> None:
+@pytest.mark.parametrize("seed", [None, 1, 2, 3])
+def test_quadratic_sector_against_the_whole_wheel(tmp_path: Path, seed: int | None,
+                                                  sets: list[str]) -> None:
     """Tetrahedra with middle nodes, which sets of corners do not name: all nodal diameters are
-    those of the wheel of all sectors, assembled without any symmetry."""
-    wheel = StoredWheel(tmp_path)
+    those of the wheel of all sectors, assembled without any symmetry. About each axis, in either
+    direction, with any number of sectors."""
+    wheel = StoredWheel(tmp_path, seed=seed)
     target = tmp_path / "sector.h5"
-    assert run_import(tmp_path / "sector.inp", "-q", "--sectors", N_SECTORS, *sets, "-o",
-                      target) == 0
+    # Sets come in either order; which face is left follows from the direction of the axis.
+    axis = ("-" if seed and seed % 2 else "") + wheel.axis
+    assert run_import(tmp_path / "sector.inp", "-q", "--sectors", wheel.n_sectors,
+                      f"--axis={axis}", *sets, "-o", target) == 0
     data = datasets(target)
     assert len(data["cyclic/left"]) == 3 * wheel.n_cut
-    found = np.sort(np.concatenate(
-        [np.tile(row, 1 if k == 0 else 2)
-         for k, row in enumerate(frequencies(tmp_path, target, 6))]))
+    rows = frequencies(tmp_path, target, 6)
+    # Of each nodal diameter but 0 and N/2 there are two waves.
+    found = np.sort(np.concatenate([np.tile(row, 1 if 2 * k % wheel.n_sectors == 0 else 2)
+                                    for k, row in enumerate(rows)]))
     whole = wheel.whole()
     # Of each nodal diameter the lowest six: all below the lowest of the sixth ones.
-    below = min(row[-1] for row in frequencies(tmp_path, target, 6))
+    below = min(row[-1] for row in rows)
     found, whole = (values[values < below * (1.0 - EXACT)] for values in (found, whole))
-    assert len(whole) > 12
+    assert len(whole) > 8
     assert found == pytest.approx(whole, rel=EXACT)
+
+
+def test_every_nodal_diameter_on_its_own_of_a_job(tmp_path: Path) -> None:
+    """The mesh of the deck finds the cut faces and is left out then: none belongs to all."""
+    (tmp_path / "pairs.csv").write_text("side_1_t1, side_1_t2, side_1_n\n3:1, 3:2, 3:3\n")
+    assert run_import(WHEEL, "-q", "--sectors", 8, "--pairs", tmp_path / "pairs.csv", "--reduce",
+                      4, "--by-diameter", "-o", tmp_path / "wheel.h5") == 0
+    with h5py.File(tmp_path / "wheel.h5") as file:
+        assert sorted(map(int, file["nodal_diameter"])) == list(range(5)) and "mesh" not in file
+
+
+def test_a_set_names_the_blade(tmp_path: Path) -> None:
+    (tmp_path / "rim.csv").write_text("node\n3\n6\n9\n12\n")
+    found = []
+    for name in ("RIM", tmp_path / "rim.csv"):
+        assert run_import(WHEEL, "-q", "--sectors", 8, "--blade", name, "--blade-modes", 2, "-o",
+                          tmp_path / "wheel.h5") == 0
+        found.append(datasets(tmp_path / "wheel.h5")["mistuning/rows"])
+    assert np.array_equal(*found) and np.abs(found[0]).max() > 0.0
 
 
 def test_the_same_nodes_held_by_name(tmp_path: Path) -> None:

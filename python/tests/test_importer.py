@@ -125,9 +125,18 @@ def test_round_trip(name: str, tmp_path: Path) -> None:
 
 
 def test_ansys_full_file() -> None:
-    """The file that ansys-mapdl-reader ships: a beam of 40 hexahedra."""
-    examples = pytest.importorskip("ansys.mapdl.reader.examples")
+    """The file that ansys-mapdl-reader ships, a beam of 40 hexahedra, as that package reads it."""
+    reader = pytest.importorskip("ansys.mapdl.reader")
+    from ansys.mapdl.reader import examples
+
     found = read_matrices(examples.fullfile)
+    dofs, stiffness, mass = reader.read_binary(examples.fullfile).load_km(sort=True)
+    assert [(int(node), int(c) + 1) for node, c in dofs] == found.labels
+    held = found.matrices["k"].diagonal() >= 1e30
+    for name, half in (("k", stiffness), ("m", mass)):
+        expected = half + sp.triu(half, 1).T + sp.tril(half, -1).T
+        own = found.matrices[name] - sp.diags_array(np.where(held, 1e30, 0.0) * (name == "k"))
+        assert abs(own - expected).max() == 0.0
     assert found.labels is not None
     assert len(found.labels) == found.matrices["k"].shape[0]
     model = drop(FullModel({"mass": found.matrices["m"], "stiffness": found.matrices["k"]},

@@ -74,6 +74,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=sorted(FORMATS), help="of all files; else found out")
     parser.add_argument("--mirror", action="store_true",
                         help="a matrix with one triangle only is symmetric")
+    parser.add_argument("--unsymmetric", action="store_true",
+                        help="an unsymmetric stiffness is meant, as of friction that slides: its "
+                             "skew part goes into /stiffness_unsymmetric")
     parser.add_argument("--mass-factor", type=float, default=1.0, metavar="X",
                         help="multiplies the mass, such as 1e-3 from kg to tonnes")
     parser.add_argument("--labels", type=Path, metavar="TABLE",
@@ -130,9 +133,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--by-diameter", action="store_true",
                         help="reduce the sector on its own in every nodal diameter, without its "
                              "interfaces")
-    parser.add_argument("--blade", type=Path, metavar="TABLE",
-                        help="nodes of the blade above the disk (column node): its modes go into "
-                             "the file as rows, by which blades may differ (&mistuning)")
+    parser.add_argument("--blade", type=Path, metavar="SET|TABLE",
+                        help="nodes of the blade above the disk, a set of the mesh or a table "
+                             "(column node): its modes go into the file as rows, by which blades "
+                             "may differ (&mistuning)")
     parser.add_argument("--blade-modes", type=int, metavar="N",
                         help="how many modes of the blade (default: 5)")
     parser.add_argument("--stress-rows", type=Source.of, metavar="FILE[#NAME]",
@@ -166,6 +170,10 @@ def main(options: argparse.Namespace) -> int:
     found = [note if isinstance(note, Finding) else Finding("note", "files", note)
              for note in model.notes] + check_model(model, options.factor)
     wanted = _modes(options)
+    whole = model
+    if options.by_diameter and options.mesh is None:
+        # The mesh of a deck has found the cut faces; nodal diameters have no common one to show.
+        model = replace(model, mesh=None)
     wrong = [finding for finding in found if finding.kind == "error"]
     if not wrong and options.check is not None and wanted is not None:
         # Says what a reduction would refuse.
@@ -178,7 +186,7 @@ def main(options: argparse.Namespace) -> int:
     if options.check is not None:
         if picture is not None:
             order = 1 if options.engine_order is None else options.engine_order
-            for finding in draw_wheel(wheel_of(model, order), picture):
+            for finding in draw_wheel(wheel_of(whole, order), picture):
                 print(finding)
         print(f"no errors in {model.dofs.n} degrees of freedom, "
               f"{0 if model.pairs is None else len(model.pairs)} pairs")
@@ -234,7 +242,8 @@ def _read(options: argparse.Namespace) -> FullModel:
     files = options.files if job is None else [
         job.dofs, *(path for path in options.files if find_job(path) is None)]
     model = gather(sources, files, format=options.format, mirror=options.mirror,
-                   mass_factor=options.mass_factor, labels=labels)
+                   mass_factor=options.mass_factor, labels=labels,
+                   unsymmetric=options.unsymmetric)
     model = replace(model, stress=_stress_of_rows(options, model),
                     speeds=read_speeds(options.at_speed, options.format, model, options.mirror))
     model, deck = _with_mesh(model, options, job)

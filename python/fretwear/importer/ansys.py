@@ -1,4 +1,4 @@
-"""ANSYS matrices: Harwell-Boeing files by scipy, .full files by ansys-mapdl-reader.
+"""ANSYS matrices: Harwell-Boeing files, by scipy.
 
 scipy reads real unsymmetric matrices without right-hand sides (RUA); HBMAT writes symmetric ones
 (RSA) and can add the load. So the header is rewritten for scipy, and the triangle mirrored.
@@ -7,16 +7,15 @@ scipy reads real unsymmetric matrices without right-hand sides (RUA); HBMAT writ
 from __future__ import annotations
 
 import io
-import warnings
 from pathlib import Path
 
 import scipy.io
 import scipy.sparse as sp
 
 from ..errors import InputError
-from .matrix_file import HELD, MatrixFile, mirrored, need
+from .matrix_file import MatrixFile, mirrored
 
-__all__ = ["read_full", "read_harwell_boeing"]
+__all__ = ["read_harwell_boeing"]
 
 _SYMMETRIC = "RSA"
 _ACCEPTED = ("RUA", _SYMMETRIC)
@@ -57,24 +56,3 @@ def _for_scipy(lines: list[str]) -> str:
     body += [line.upper().replace("D", "E") for line in lines[values:values + counts[2]]]
     header[3] = header[3].upper().replace("D", "E")
     return "\n".join(header + body) + "\n"
-
-
-def read_full(path: Path) -> MatrixFile:
-    """Stiffness (k) and mass (m) of a .full file, with nodes.
-
-    The file has no entries for constrained degrees of freedom; they are marked as held.
-    """
-    reader = need("ansys.mapdl.reader", "ansys-mapdl-reader", "reading ANSYS .full files",
-                  "ansys")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        file = reader.read_binary(str(path))
-        dofs, stiffness, mass = file.load_km(sort=True)
-    labels = [(int(node), int(component) + 1) for node, component in dofs]
-    if len(labels) != stiffness.shape[0]:
-        raise InputError(f"{path}: {len(labels)} degrees of freedom are named, but the stiffness "
-                         f"has {stiffness.shape[0]}")
-    constrained = {(int(node), int(component) + 1) for node, component in file.const}
-    marks = sp.diags_array([HELD if label in constrained else 0.0 for label in labels])
-    return MatrixFile(path, {"k": sp.csr_array(mirrored(stiffness) + marks),
-                             "m": mirrored(mass)}, labels)

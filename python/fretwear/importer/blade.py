@@ -47,7 +47,7 @@ class BladeNodes:
 
 
 def read_blade(path: Path, dofs: Dofs, n_modes: int) -> BladeNodes:
-    """The nodes of a table, which hang on no others but those where the blade stands.
+    """The nodes of a table or a set, which hang on no others but those where the blade stands.
 
     Raises
     ------
@@ -57,11 +57,13 @@ def read_blade(path: Path, dofs: Dofs, n_modes: int) -> BladeNodes:
     if dofs.labels is None:
         raise InputError("--blade names nodes, but the files name none; give a label table "
                          "(--labels)")
-    table = read_table(path, ["node", "x", "y", "z"])
-    column = table.numbers("node")
-    if column is None:
-        raise InputError(f"{path}: expected the column node")
-    nodes = set(column.astype(int).tolist())
+    if not path.is_file() and str(path).upper() in dofs.sets:
+        nodes = set(dofs.nodes(str(path), "--blade"))
+    else:
+        column = read_table(path, ["node", "x", "y", "z"]).numbers("node")
+        if column is None:
+            raise InputError(f"{path}: expected the column node")
+        nodes = set(column.astype(int).tolist())
     inside = np.array([i for i, (node, _) in enumerate(dofs.labels) if node in nodes], dtype=int)
     missing = nodes - {node for node, _ in dofs.labels}
     held = {node for node, _ in dofs.held}

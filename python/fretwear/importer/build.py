@@ -30,7 +30,7 @@ from .sectors import Interfaces
 from .stress import StressRows, stress_datasets
 from .tables import LOADS, Pairs, contact_rows
 
-__all__ = ["ROLES", "Accuracy", "FullModel", "Source", "drop", "gather", "model_datasets",
+__all__ = ["ROLES", "SKEW", "Accuracy", "FullModel", "Source", "drop", "gather", "model_datasets",
            "read_rows", "read_speeds", "save"]
 
 Floats = NDArray[np.float64]
@@ -44,6 +44,10 @@ ROLES = {
                 "damping_matrix"),
     "stiffness_rotation": ("stiffness_rotation",),
 }
+#: Part of a model file for the skew part of a stiffness.
+SKEW = "stiffness_unsymmetric"
+#: A skew part below this share of the largest entry is rounding.
+_SYMMETRIC = 1e-13
 #: Beside rest: as many as the library interpolates between.
 _MOST_SPEEDS = 3
 # fw_run works with full matrices.
@@ -71,7 +75,8 @@ class FullModel:
     Attributes
     ----------
     matrices : dict of str to (n, n) sparse array
-        'mass' and 'stiffness', perhaps 'damping' and 'stiffness_rotation'.
+        'mass' and 'stiffness', perhaps 'damping', 'stiffness_rotation', and the skew part
+        'stiffness_unsymmetric'.
     dofs : Dofs
         Their degrees of freedom.
     pairs : Pairs or None
@@ -119,7 +124,8 @@ class FullModel:
 
 def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
            format: str | None = None, mirror: bool = False, mass_factor: float = 1.0,
-           labels: Sequence[tuple[int, int]] | None = None) -> FullModel:
+           labels: Sequence[tuple[int, int]] | None = None,
+           unsymmetric: bool = False) -> FullModel:
     """Read the matrices of a model.
 
     Parameters
@@ -136,6 +142,8 @@ def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
         Multiplies the mass, such as 1e-3 from kg to tonnes.
     labels : sequence of (node, component), optional
         Of the rows, where the files have none.
+    unsymmetric : bool
+        Whether an unsymmetric stiffness is meant, where its file does not say so.
     """
     cache: dict[Path, MatrixFile] = {}
 
@@ -166,8 +174,25 @@ def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
         if mirror and one_triangle(matrix):
             matrices[role] = mirrored(matrix)
     matrices["mass"] = matrices["mass"] * mass_factor
-    return FullModel(matrices, dofs, notes=[note for file in cache.values()
-                                            for note in file.notes])
+    notes: list[str | Finding] = [note for file in cache.values() for note in file.notes]
+    if unsymmetric or any(file.unsymmetric for file in cache.values()):
+        notes += _split(matrices)
+    return FullModel(matrices, dofs, notes=notes)
+
+
+def _split(matrices: dict[str, sp.csr_array]) -> list[Finding]:
+    """Leave the symmetric part of the stiffness, and its skew part as a matrix of its own."""
+    whole = matrices["stiffness"]
+    skew = sp.csr_array(0.5 * (whole - whole.T))
+    size = float(abs(skew).max() / max(float(abs(whole).max()), np.finfo(float).tiny))
+    if size <= _SYMMETRIC:
+        return []
+    skew.eliminate_zeros()
+    matrices["stiffness"] = sp.csr_array(0.5 * (whole + whole.T))
+    matrices[SKEW] = skew
+    return [Finding("warning", "stiffness", f"not symmetric, as its file says: the skew part, up "
+                    f"to {size:.2g} of the largest entry, goes into {SKEW}; it feeds or takes "
+                    "energy, as friction that slides at rest does")]
 
 
 def read_rows(source: Source, format: str | None = None,
@@ -307,7 +332,8 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
     factor : str
         Who factors, as `fretwear.reduction.reduce` takes it.
     """
-    symmetric = {role: _symmetric(matrix) for role, matrix in model.matrices.items()}
+    symmetric = {role: _symmetric(matrix) for role, matrix in model.matrices.items()
+                 if role != SKEW}
     observed = _observed(model)
     cyclic = model.interfaces is not None
     for name, given in (("--blade", model.blade), ("--stress-rows and --stress-table",
@@ -315,6 +341,8 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
         if by_diameter and given:
             raise InputError(f"{name} does not go with --by-diameter: leave that out, so that one "
                              "set of coordinates serves all nodal diameters")
+    if by_diameter and SKEW in model.matrices:
+        raise InputError("an unsymmetric stiffness does not go with --by-diameter")
     if by_diameter:
         return _by_diameter(model, symmetric, n_modes, factor)
     if cyclic and model.pairs is not None and model.pairs.rows is not None:
@@ -336,6 +364,8 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
         data, reduction = (_reduced_sector if cyclic else _reduced)(model, symmetric, n_modes,
                                                                     progress, factor)
         observed = reduction.row(observed)
+    if SKEW in model.matrices:
+        data[SKEW] = _skew(model.matrices[SKEW], reduction)
     if model.mesh is not None:
         data |= mesh_datasets(recovery_mesh(model, reduction))
     if model.blade is not None:
@@ -369,6 +399,15 @@ def _at_speeds(model: FullModel, data: dict[str, NDArray[Any]],
                                                   else reduction.matrix(whole))
         if per_square is not None:
             found[f"speed/{number}/static"] = speed**2 * per_square
+    return found
+
+
+def _skew(matrix: sp.csr_array, reduction: Reduction | None) -> NDArray[Any]:
+    """A skew matrix on the coordinates of a reduction, T^T A T, skew to the last bit."""
+    if reduction is None:
+        return matrix.toarray()
+    product = reduction.row(np.ascontiguousarray(reduction.row(matrix).T)).T
+    found: NDArray[Any] = 0.5 * (product - product.T)
     return found
 
 

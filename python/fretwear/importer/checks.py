@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .build import FullModel
+from .build import SKEW, FullModel
 from .finding import Finding
 from .recovery import check_mesh
 from .sectors import check_interfaces, tied_spectrum
@@ -72,6 +72,8 @@ def _finite(model: FullModel, name: str, matrix: sp.csr_array) -> Findings:
 
 
 def _symmetric(model: FullModel, name: str, matrix: sp.csr_array) -> Findings:
+    if name == SKEW:
+        return
     difference = sp.coo_array(abs(matrix - matrix.T))
     largest = abs(matrix).max()
     if not difference.nnz or not largest > 0.0:
@@ -91,8 +93,8 @@ def _symmetric(model: FullModel, name: str, matrix: sp.csr_array) -> Findings:
                       "that the matrix is symmetric; write the full matrix, or say so with "
                       "--mirror")
     else:
-        yield Finding("error", name, f"{text}; gyroscopic and circulatory terms do not belong in "
-                      "a model file")
+        yield Finding("error", name, f"{text}; an unsymmetric stiffness that is meant goes in "
+                      "with --unsymmetric, gyroscopic terms do not")
 
 
 def _diagonals(model: FullModel, name: str, matrix: sp.csr_array) -> Findings:

@@ -8,7 +8,7 @@ dmig               Nastran DMIG bulk or punch section           pyyeti
 mat                MATLAB up to 7.2; 7.3                        scipy; h5py
 matrix_market      many                                         scipy
 harwell_boeing     ANSYS HBMAT and others, RUA and RSA          scipy (symmetric: see `ansys`)
-full               ANSYS .full                                  ansys-mapdl-reader
+full               ANSYS .full                                  `full_file`
 abaqus             Abaqus .mtx                                  `abaqus`, no maintained reader
 calculix           CalculiX .sti, .mas, .dof                    `calculix`, no maintained reader
 =================  ===========================================  ==============================
@@ -25,8 +25,9 @@ import scipy.sparse as sp
 
 from ..errors import InputError, OutputError
 from .abaqus import read_mtx
-from .ansys import read_full, read_harwell_boeing
+from .ansys import read_harwell_boeing
 from .calculix import SUFFIXES, read_stored
+from .full_file import read_full
 from .matlab import read_mat
 from .matrix_file import MatrixFile
 from .nastran import read_dmig, read_op4

@@ -34,12 +34,15 @@ class MatrixFile:
         Of the rows of every square matrix, where the file names them.
     notes : list of str
         What the reader has done that the user should know.
+    unsymmetric : set of str
+        Matrices that the file says to be unsymmetric.
     """
 
     path: Path
     matrices: dict[str, sp.csr_array]
     labels: list[Label] | None = None
     notes: list[str] = field(default_factory=list)
+    unsymmetric: frozenset[str] = frozenset()
 
 
 def need(module: str, package: str, purpose: str, extra: str = "import") -> ModuleType:

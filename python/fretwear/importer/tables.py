@@ -253,8 +253,10 @@ def _expanded(table: _Table, dofs: Dofs, places: Mapping[int, Floats]) -> _Table
         named: list[dict[str, str]] = [{}, {}]
         for side in (1, 2):
             for column in (f"node_{side}", *(f"side_{side}_{c}" for c in DIRECTIONS)):
-                word = line.get(column, "").lstrip("+-").partition(":")[0].strip()
-                if word and not word.isdigit():
+                word, colon, _ = line.get(column, "").lstrip("+-").partition(":")
+                word = word.strip()
+                # A component belongs to a degree of freedom; a node stands alone.
+                if word and not word.isdigit() and (colon or column.startswith("node")):
                     named[side - 1][column] = word
         sets = [list(dict.fromkeys(word.upper() for word in side.values())) for side in named]
         if not sets[0] and not sets[1]:

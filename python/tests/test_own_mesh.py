@@ -1,0 +1,100 @@
+"""The job of example/own_mesh: mesh of Gmsh, matrices of CalculiX, response, files of ParaView."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from project import ROOT
+from test_import_calculix import WRITTEN, frequencies, run_import
+
+from fretwear.cli import main
+from fretwear.importer.meshes import read_mesh_file
+from fretwear.importer.sectors import cut_faces
+
+EXAMPLE = ROOT / "example" / "own_mesh"
+PAGE = EXAMPLE / "README.md"
+#: The mesh and its motion are kept in single precision.
+STORED = 1e-4
+MODEL = ["--sectors", 12, "--pairs", "pairs.csv", "--observe", "tip=TIP:3"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example with its mesh and its matrices, by the commands of its page."""
+    for program in ("gmsh", "ccx", "awk"):
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed (apt install gmsh calculix-ccx)")
+    path = tmp_path_factory.mktemp("own_mesh")
+    for file in EXAMPLE.iterdir():
+        shutil.copy(file, path)
+    page = PAGE.read_text()
+    for command in re.findall(r"^    ((?:gmsh|awk|ccx) .*)$", page, re.MULTILINE):
+        subprocess.run(command, shell=True, cwd=path, check=True, capture_output=True)
+    return path
+
+
+def test_from_gmsh_to_paraview(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    assert run_import("disk.inp", "-q", *MODEL, "--reduce", 12, "-o", "disk.h5") == 0
+    # The lines of the page, but for the picture.
+    lines = re.findall(r"```python\n(.*?)result.animate", PAGE.read_text(), re.DOTALL)
+    exec(lines[0], {})
+    with h5py.File("frf.h5") as file:
+        assert (file["converged"][()] == 1).all()
+        amplitude, coefficients = file["amplitude"][()][:, 0], file["coefficients"][()][:, :, 0]
+    assert main(["export", "frf.h5", "disk.vtu", "--sectors", "all", "--frames", "2"]) == 0
+    moved = meshio.read("disk_000.vtu")
+    assert Path("disk.pvd").is_file()
+    # The tip of sector 0 in the file moves as the response says.
+    tip = int(np.argmin(np.linalg.norm(moved.points - [60.0, 0.0, 5.0], axis=1)))
+    assert moved.points[tip] == pytest.approx([60.0, 0.0, 5.0], abs=1e-4)
+    cosine, sine = (moved.point_data[f"displacement_{part}"] for part in ("cosine", "sine"))
+    largest = coefficients[int(np.argmax(amplitude))]
+    assert [cosine[tip, 2], sine[tip, 2]] == pytest.approx(largest[1:3], rel=STORED)
+    # Twelve sectors later: the same motion, two twelfths of a period behind for each.
+    around = moved.points[:, :2] @ np.array([1.0, 1j])
+    later = int(np.argmin(np.abs(around - 60.0 * np.exp(2j * np.pi / 12))
+                          + np.abs(moved.points[:, 2] - 5.0)))
+    motion = cosine[:, 2] - 1j * sine[:, 2]
+    assert motion[later] == pytest.approx(motion[tip] * np.exp(-2j * np.pi * 2 / 12),
+                                          rel=STORED)
+
+
+def test_frequencies_are_those_of_the_cyclic_symmetry_of_calculix(
+        folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    assert run_import("disk.inp", "-q", "--sectors", 12, "-o", "free.h5") == 0
+    found = frequencies(folder, folder / "free.h5")
+    mesh = read_mesh_file("disk.inp")
+    held = set(mesh.sets["BORE"])
+    left, right, _ = cut_faces(12, None, None, "z", mesh)
+    sets = "".join(f"*SURFACE, NAME={name}, TYPE=NODE\n" + "".join(
+        f"{node}\n" for node in face.nodes if node not in held)
+        for name, face in (("LEFT", left), ("RIGHT", right)))
+    deck = (folder / "disk.inp").read_text().partition("*STEP")[0]
+    (folder / "cyclic.inp").write_text(
+        deck + sets + "*TIE, NAME=CUT, CYCLIC SYMMETRY\nLEFT, RIGHT\n"
+        "*CYCLIC SYMMETRY MODEL, N=12, TIE=CUT\n0, 0, 0, 0, 0, 1\n" + "".join(
+            f"*STEP\n*FREQUENCY\n2\n*SELECT CYCLIC SYMMETRY MODES, NMIN={k}, NMAX={k}\n*END STEP\n"
+            for k in (1, 2, 5)))
+    subprocess.run(["ccx", "cyclic"], check=True, capture_output=True)
+    table = [line.split() for line in (folder / "cyclic.dat").read_text().splitlines()]
+    for k in (1, 2, 5):
+        own = min(float(words[3]) for words in table
+                  if len(words) == 6 and words[0] == str(k) and words[1].isdigit())
+        assert found[k, 0] == pytest.approx(own, rel=WRITTEN)
+
+
+def test_the_page_has_the_commands_that_are_tried_here() -> None:
+    """What the page says of the import is what the tests above do."""
+    page = PAGE.read_text()
+    words = " ".join(map(str, MODEL))
+    assert f"fretwear import disk.inp {words} --reduce 12 -o disk.h5" in page
+    assert "fretwear export frf.h5 disk.vtu --sectors all" in page
