@@ -171,7 +171,7 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 damper: build ## tables and picture of docs/damper.md
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.dampers --build $(BUILD)
 
-cylinder: build ## tables and pictures of docs/cylinder_on_flat.md; PARTS=large: a thousand cells
+cylinder: build ## tables and pictures of docs/cylinder_on_flat.md; PARTS="large thousand": fine grids
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.cylinder --build $(BUILD) \
 	   $(PARTS)
 
