@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz notebooks wheel ways sensitivities resonances modes calibration stops controls
 .PHONY: parameters family
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
-.PHONY: bench-peers bench-full compare cylinder damper disk mistuned-disk paper
+.PHONY: bench-peers bench-full compare cylinder damper good-for disk mistuned-disk paper
 .PHONY: thresholds
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
@@ -139,7 +139,7 @@ bench-paper: build ## methods, iterations against frequency, aliasing
 	PYTHONPATH=python $(PYTHON) -m bench.run paper iterations aliasing
 
 bench-time: build ## harmonic balance against integration in time
-	PYTHONPATH=python $(PYTHON) -m bench.run time
+	PYTHONPATH=python $(PYTHON) -m bench.run time joints
 
 # Models that are not there yet are generated into build/bench first; 768 pairs take minutes.
 # 1,536 pairs are measured too where build/bench/sector_1536_coarse.h5 was made (half an hour).
@@ -171,9 +171,12 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 damper: build ## tables and picture of docs/damper.md
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.dampers --build $(BUILD)
 
-cylinder: build ## tables and pictures of docs/cylinder_on_flat.md; PARTS=large: a thousand cells
+cylinder: build ## tables and pictures of docs/cylinder_on_flat.md; PARTS="large thousand": fine grids
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.cylinder --build $(BUILD) \
 	   $(PARTS)
+
+good-for: build ## what uncertain inputs do to a peak, in docs/good_for.md
+	PYTHONPATH=python:$(BUILD)/python $(PYTHON) -m bench.good_for --build $(BUILD)
 
 disk: build ## tables and pictures of docs/shrouded_disk.md
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk --build $(BUILD)

@@ -2,9 +2,9 @@
 
     python -m bench.run [PART ...] [--build build/release] [--before fw_run] [--quick] [-o docs]
 
-Parts: speed, precision, events, solvers, paper, iterations, aliasing, time, scaling, limit, skips,
-laws, peers, or all; without any, speed. A part replaces its page, docs/benchmarks/PART.md, and the
-first page is made anew.
+Parts: speed, precision, events, solvers, paper, iterations, aliasing, time, joints, scaling, limit,
+skips, laws, peers, or all; without any, speed. A part replaces its page, docs/benchmarks/PART.md,
+and the first page is made anew.
 
 Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
 tries the scripts and measures nothing.
@@ -32,6 +32,7 @@ from bench.peers.branches import BRANCHES, count_again, measure_branches, write_
 from bench.peers.sector_and_chain import measure_peers, write_peers
 from bench.precision.events import measure_events, write_events, write_pairs
 from bench.precision.integration import measure_integration, write_integration
+from bench.precision.joints_in_time import measure_joints, write_joints
 from bench.precision.report import write_precision
 from bench.precision.responses import measure_precision
 from bench.precision.worn import measure_wear_precision, write_wear_precision
@@ -132,6 +133,11 @@ def integration(job: Job) -> str:
     return write_integration(measure_integration(job.bench, job.step))
 
 
+def joints(job: Job) -> str:
+    """Joints and a disk against integration in time."""
+    return write_joints(measure_joints(job.bench, job.step))
+
+
 def peers(job: Job) -> str:
     """Other programs on the same problems."""
     points = write_peers(measure_peers(job.bench, job.peer_python))
@@ -167,7 +173,8 @@ def laws(job: Job) -> str:
 
 PARTS = {"speed": speed, "precision": precision, "events": events, "solvers": solvers,
          "paper": paper, "iterations": iterations, "aliasing": aliasing, "time": integration,
-         "scaling": scaling, "limit": limit, "skips": skips, "laws": laws, "peers": peers}
+         "joints": joints, "scaling": scaling, "limit": limit, "skips": skips, "laws": laws,
+         "peers": peers}
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ __all__ = ["COMMON", "ORDER", "anchor", "targets", "update_document", "with_orig
 
 #: Parts in the order of the document.
 ORDER = ("speed", "precision", "events", "solvers", "paper", "iterations", "aliasing", "time",
-         "scaling", "limit", "skips", "laws", "peers", "sectors", "blades",
+         "joints", "scaling", "limit", "skips", "laws", "peers", "sectors", "blades",
          "populations", "modes", "imports",
          "patches", "kernels", "workers", "busy", "missions")
 #: A verdict on a target: met or missed, and the words behind it up to the end of its cell or

@@ -32,7 +32,7 @@ COMMANDS = """## Measure
 | `make bench-precision` | precision, events |
 | `make bench-solvers` | solvers |
 | `make bench-paper` | paper, iterations, aliasing |
-| `make bench-time` | time |
+| `make bench-time` | time, joints |
 | `make bench-scaling` | scaling |
 | `make bench-limit` | limit, skips, laws |
 | `make bench-peers` | peers |
