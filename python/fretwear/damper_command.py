@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
+import warnings
 from pathlib import Path
 
 from .dampers import KINDS, Flank, damper
@@ -54,15 +56,20 @@ def main(options: argparse.Namespace) -> int:
     """Add the body; returns the exit status."""
     stiffness = options.stiffness or (None, None)
     flanks = {where: _flank(options, where) for where in ("left", "right")}
-    model = damper(
-        Model.from_hdf5(options.model), options.kind, mass=options.mass,
-        inertia=None if options.inertia is None else
-        options.inertia[0] if len(options.inertia) == 1 else options.inertia,
-        radius=options.radius, angles=options.angles and tuple(options.angles), size=options.size,
-        left=flanks["left"], right=flanks["right"], mu=options.mu,
-        tangential_stiffness=stiffness[0], normal_stiffness=stiffness[1],
-        compliance=options.compliance and tuple(options.compliance), law=options.law,
-        name=options.name)
+    plain = Model.from_hdf5(options.model)
+    with warnings.catch_warnings(record=True) as remarks:
+        warnings.simplefilter("always")
+        model = damper(
+            plain, options.kind, mass=options.mass,
+            inertia=None if options.inertia is None else
+            options.inertia[0] if len(options.inertia) == 1 else options.inertia,
+            radius=options.radius, angles=options.angles and tuple(options.angles),
+            size=options.size, left=flanks["left"], right=flanks["right"], mu=options.mu,
+            tangential_stiffness=stiffness[0], normal_stiffness=stiffness[1],
+            compliance=options.compliance and tuple(options.compliance), law=options.law,
+            name=options.name)
+    for remark in remarks:
+        print(f"remark: {remark.message}", file=sys.stderr)
     model.to_hdf5(options.output)
     assert model.bodies is not None
     print(f"{options.output}: {model.n_dof} dofs, {model.n_pairs} pairs, "

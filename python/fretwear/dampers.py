@@ -12,6 +12,7 @@ right one, y points outwards, z along the axis.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -32,6 +33,8 @@ Floats = NDArray[np.float64]
 KINDS = ("wedge", "cylinder", "strip", "split_ring", "mesh")
 #: Flanks of these lie at 90 degrees to the radial direction.
 _FLAT = ("strip", "split_ring")
+#: Angles of both flanks below this [degrees] are likely radians: no wedge is so slender.
+_RADIANS = 3.2
 #: Stiffness of pairs whose law takes none.
 _UNUSED = {"tangential_stiffness": 1.0, "normal_stiffness": 1.0}
 
@@ -118,6 +121,12 @@ def damper(model: Model, kind: str = "wedge", *, mass: float | None = None,
     ------
     InputError
         An argument does not fit.
+
+    Warns
+    -----
+    UserWarning
+        Angles that look like radians; a flank whose platforms pull, as where left and right are
+        exchanged.
     """
     if kind not in KINDS:
         raise InputError(f"kind: is {kind!r}, must be one of {', '.join(KINDS)}")
@@ -129,10 +138,18 @@ def damper(model: Model, kind: str = "wedge", *, mass: float | None = None,
         raise InputError(f"angles: are {angles}, must be (90, 90) for a {kind}")
     if len(angles) != 2 or not all(0.0 < angle < 180.0 for angle in angles):
         raise InputError(f"angles: are {angles}, must be two between 0 and 180 degrees")
+    if max(angles) < _RADIANS:
+        warnings.warn(f"angles: are {angles}, below {_RADIANS:g} degrees: give degrees, not "
+                      "radians", stacklevel=2)
     points = [point for side, flank, angle in ((-1, left, angles[0]), (1, right, angles[1]))
               if flank is not None for point in _points(kind, side, flank, angle, size)]
     if not points:
         raise InputError("left and right: are None, must be one Flank at least")
+    if model.sectors is None and any(point.sector for point in points):
+        raise InputError("sector: is not 0, but the model has no sectors: leave it out, or give "
+                         "the model its sectors (/cyclic, Model(sectors=...)) first")
+    if kind == "wedge":
+        _remark_pull(points)
     n_axes = {len(point.dofs) for point in points}
     if len(n_axes) > 1:
         raise InputError("left.dofs and right.dofs: have 2 and 3 columns, must have the same")
@@ -141,6 +158,20 @@ def damper(model: Model, kind: str = "wedge", *, mass: float | None = None,
     return _joined(model, body, points, radius, compliance, law, name, space, {
         "mu": mu, "tangential_stiffness": tangential_stiffness,
         "normal_stiffness": normal_stiffness})
+
+
+def _remark_pull(points: list[_Point]) -> None:
+    """A platform presses a body on the side that it lies on: seen from the centre of mass, its
+    normal points inwards. (A point far below the centre may do without.)"""
+    for where, side in (("left", -1.0), ("right", 1.0)):
+        # t2 of the frame says the side.
+        of_flank = [point for point in points if point.frame[1, 2] == -side]
+        pulls = [point.place @ point.frame[2] > 0.0 and side * point.place[0] < 0.0
+                 for point in of_flank]
+        if of_flank and all(pulls):
+            warnings.warn(f"{where}.points: lie where the {where} flank pulls, as where left and "
+                          "right are exchanged: x points from the left flank to the right one, y "
+                          "outwards", stacklevel=3)
 
 
 @dataclass(frozen=True)
@@ -223,8 +254,9 @@ def _rigid(mass: float | None, inertia: ArrayLike | None, space: bool) -> _Body:
         else:
             raise InputError("inertia: must be three numbers or (3, 3) in space")
         slots += (3, 4, 5) if space else (5,)
-        unit[3:, 3:] = tensor / mass
-        if np.abs(tensor - tensor.T).max() > 0.0 or np.linalg.eigvalsh(
+        unit[3:, 3:] = 0.5 * (tensor + tensor.T) / mass
+        # A tensor that was turned is symmetric to round-off.
+        if np.abs(tensor - tensor.T).max() > 1e-12 * np.abs(tensor).max() or np.linalg.eigvalsh(
                 tensor[np.ix_([k - 3 for k in slots if k > 2],
                               [k - 3 for k in slots if k > 2])]).min() <= 0.0:
             raise InputError("inertia: must be symmetric and positive")

@@ -192,6 +192,10 @@ def _draw(case: Case, patterns: int | ArrayLike, seed: int, deviation: float,
             raise InputError(f"deviation: is {deviation:g}, must be a standard deviation, such as "
                              "0.02")
         drawn = deviation * rng.standard_normal((n, _n_sectors(case)))
+        if (drawn <= -1.0).any():
+            raise InputError(f"deviation: is {deviation:g}, which draws blades without a frequency"
+                             ": it is a standard deviation in parts of the tuned frequencies, such "
+                             "as 0.02 (2 %)")
     else:
         drawn = np.asarray(patterns, dtype=np.float64)
         if drawn.ndim not in (2, 3) or not np.isfinite(drawn).all() or len(drawn) == 0:

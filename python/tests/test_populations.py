@@ -157,6 +157,7 @@ def test_quantiles_lie_in_their_intervals() -> None:
 @pytest.mark.parametrize(("more", "told"), [
     ({"patterns": 0}, "must be a number of disks"),
     ({"deviation": -1.0}, "must be a standard deviation"),
+    ({"deviation": 3.0}, "draws blades without a frequency"),
     ({"patterns": [[np.nan] * N]}, "must be finite"),
     ({"contact": {"mass": 0.1}}, "must be among mu"),
     ({"contact": {"mu": 0.1}}, "mu is not given for any pair")])

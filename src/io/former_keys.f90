@@ -1,4 +1,5 @@
-!> Keys that there were, and what says the same now: told where a case still has one of them.
+!> Keys that there were, and what says the same now: told where a case still has one of them. And
+!> keys that are looked for where they are not: what a model alone says.
 module fw_former_keys
    implicit none (type, external)
    private
@@ -18,7 +19,13 @@ module fw_former_keys
       'use sweep%start, sweep%end and sweep%n_points of the '// &
       'part that is wanted, or let --workers cut the sweep (workers in Python)'
 
+   character(*), parameter :: of_bodies = 'bodies are those of the model file (/body, made by '// &
+      'fretwear.damper); &body gives other masses alone'
+
    type(former_key), parameter :: former(*) = [ &
+      former_key('body', 'name', of_bodies), former_key('body', 'radius', of_bodies), &
+      former_key('body', 'inertia', of_bodies), former_key('body', 'dof', of_bodies), &
+      former_key('body', 'n_bodies', of_bodies), former_key('body', 'direction', of_bodies), &
       former_key('harmonics', 'adaptive', of_levels), &
       former_key('harmonics', 'adaptive_tolerance', of_levels), &
       former_key('sweep', 'frequencies', 'is read as sweep%values: keep one of the two'), &

@@ -82,8 +82,20 @@ contains
          'coriolis']
 
       is_near = edit_distance(word, known) <= max(1, min(len(word), len(known))/4)
+      ! One of them or several: /bodies is meant for /body.
+      if (len(word) > 4) is_near = is_near .or. singular(word) == known
       if (any(matrices == known)) is_near = is_near .or. index('_'//word//'_', '_'//known//'_') > 0
    end function is_near
+
+   !> The word of one thing for that of several.
+   pure function singular(word) result(text)
+      character(*), intent(in) :: word
+      character(:), allocatable :: text
+
+      text = word
+      if (word(len(word):) == 's') text = word(:len(word) - 1)
+      if (word(len(word) - 2:) == 'ies') text = word(:len(word) - 3)//'y'
+   end function singular
 
    !> Letters only: what people write in other ways is the same name.
    pure function plain(word) result(text)

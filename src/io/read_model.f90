@@ -453,8 +453,8 @@ contains
       if (speed <= 0.0_wp .or. rotates(raw)) return
       call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
                          'stiffness_rotation, no coriolis, no circulatory, no load '// &
-                         'static_rotation and no contact gap_rotation or normal_load_rotation: '// &
-                         'remove it, or use a model file that holds them')
+                         'static_rotation, no body with a radius and no contact gap_rotation '// &
+                         'or normal_load_rotation: remove it, or use a model file that holds them')
    end subroutine check_rotation
 
    !> A speed that follows the frequency.

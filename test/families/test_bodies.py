@@ -14,6 +14,9 @@ from fretwear.cli import main
 from fretwear.errors import InputError
 from fretwear.plot import fitting, plot_damper
 
+#: Identities: residuals of 1e-12 times the condition of what slips (below 10), margin of ten.
+SAME, TIGHT = 1e-10, {"tolerance": 1e-12}
+
 M, K = np.eye(4), np.diag([9e3, 2e4, 1e4, 1.9e4])
 
 
@@ -91,18 +94,13 @@ def sliding(**more):
     return case | {"mu": 0.3 * case["mu"], "cosine": 5.0 * case["cosine"]}
 
 
-def test_wave_against_annulus(tmp_path):
-    """A wave with a body in each sector, and all sectors and bodies as one structure."""
-    n = 4
-    case = sliding(sectors=n, order=1)
-    wave = model_of(case)
-    (tmp_path / "wave").mkdir()
-    one = solved(wave, tmp_path / "wave", case["omega"], cyclic={"engine_order": 1})
-    m = wave.n_dof
+def annulus(case, wave, n, masses):
+    """All sectors and bodies as one structure, blades of other masses."""
     phases = np.exp(-2j * np.pi * np.arange(n) / n)
     load = np.concatenate([phase * (case["cosine"] - 1j * case["sine"]) for phase in phases])
     M_all, K_all, C_all = (np.kron(np.eye(n), matrix[:4, :4]) for matrix in (wave.M, wave.K,
                                                                              wave.C))
+    M_all = M_all * np.repeat(masses, 4)
     model = fw.Model(M_all, C_all, K_all, cosine=load.real, sine=-load.imag)
     for j in range(n):
         own, after = 4 * j, 4 * ((j + 1) % n)
@@ -113,15 +111,53 @@ def test_wave_against_annulus(tmp_path):
             normal_stiffness=case["kn"], law="penalty", name=f"body {j}",
             left=fw.Flank([[own + 3, own + 4]] * n_left, case["places"][0]),
             right=fw.Flank([[after + 1, after + 2]] * n_right, case["places"][1]))
+    return model
+
+
+def test_wave_against_annulus(tmp_path):
+    """A wave with a body in each sector, and all sectors and bodies as one structure."""
+    n = 4
+    case = sliding(sectors=n, order=1)
+    wave = model_of(case)
+    (tmp_path / "wave").mkdir()
+    one = solved(wave, tmp_path / "wave", case["omega"], cyclic={"engine_order": 1}, solver=TIGHT)
+    m = wave.n_dof
     (tmp_path / "whole").mkdir()
-    whole = solved(model, tmp_path / "whole", case["omega"])
+    whole = solved(annulus(case, wave, n, np.ones(n)), tmp_path / "whole", case["omega"],
+                   solver=TIGHT)
     U, W = complex_rows(one.coefficients[0]), complex_rows(whole.coefficients[0])
     size = np.abs(W).max()
     for j in range(n):
         turn = np.exp(-2j * np.pi * j * np.arange(len(U)) / n)[:, None]
-        assert np.abs(turn * U[:, :4] - W[:, 4 * j:4 * j + 4]).max() < 1e-9 * size
+        assert np.abs(turn * U[:, :4] - W[:, 4 * j:4 * j + 4]).max() < SAME * size
         body = 4 * n + (m - 4) * j
-        assert np.abs(turn * U[:, 4:] - W[:, body:body + m - 4]).max() < 1e-9 * size
+        assert np.abs(turn * U[:, 4:] - W[:, body:body + m - 4]).max() < SAME * size
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.02])
+def test_bodies_between_mistuned_blades(spread, tmp_path):
+    """Blades of a disk that differ, with a body in each sector, as one structure has them."""
+    n = 4
+    case = sliding(sectors=n, order=1)
+    wave = model_of(case)
+    m = wave.n_dof
+    deviations = spread * np.array([1.0, -0.5, 0.3, -1.2])
+    blade = np.zeros((m, m))
+    blade[:4, :4] = wave.M[:4, :4]
+    (tmp_path / "sectors").mkdir()
+    disk = solved(wave, tmp_path / "sectors", case["omega"], solver=TIGHT,
+                  cyclic={"engine_order": 1, "mistuned": True},
+                  mistuning={"mass": deviations, "blade_mass": blade.ravel()})
+    (tmp_path / "whole").mkdir()
+    whole = solved(annulus(case, wave, n, 1.0 + deviations), tmp_path / "whole", case["omega"],
+                   solver=TIGHT)
+    U, W = (complex_rows(found.coefficients[0]) for found in (disk, whole))
+    size = np.abs(W).max()
+    assert U.shape == W.shape
+    for j in range(n):
+        body = 4 * n + (m - 4) * j
+        wanted = np.hstack([W[:, 4 * j:4 * j + 4], W[:, body:body + m - 4]])
+        assert np.abs(U[:, m * j:m * j + m] - wanted).max() < SAME * size
 
 
 def test_body_of_the_next_sector(tmp_path):
@@ -144,12 +180,13 @@ def test_body_of_the_next_sector(tmp_path):
     for name, model in (("forward", forward), ("behind", behind)):
         (tmp_path / name).mkdir()
         found.append(complex_rows(solved(model, tmp_path / name, case["omega"],
-                                         cyclic={"engine_order": 3}).coefficients[0]))
+                                         cyclic={"engine_order": 3},
+                                         solver=TIGHT).coefficients[0]))
     # The body of sector 1 is what was that of sector 0.
     turn = np.exp(-2j * np.pi * 3 * np.arange(len(found[0])) / 8)[:, None]
     size = np.abs(found[0]).max()
-    assert np.abs(found[0][:, :4] - found[1][:, :4]).max() < 1e-9 * size
-    assert np.abs(found[1][:, 4:] - np.conj(turn) * found[0][:, 4:]).max() < 1e-9 * size
+    assert np.abs(found[0][:, :4] - found[1][:, :4]).max() < SAME * size
+    assert np.abs(found[1][:, 4:] - np.conj(turn) * found[0][:, 4:]).max() < SAME * size
 
 def test_static_forces_of_symmetric_wedges(tmp_path):
     """Normal forces at rest lie between those of both ends of friction."""
@@ -342,3 +379,36 @@ def test_bad_masses_of_a_case(body, wanted, tmp_path):
     blades().to_hdf5(tmp_path / "model.h5")
     message = run(tmp_path, with_model(at(120.0, speed=0.0, body={"mass": [0.1]})), status=3).stderr
     assert "no bodies" in message
+
+
+def test_slips_of_the_pen(tmp_path, capsys):
+    """Radians, exchanged flanks, sectors of a plain model, names of other programs."""
+    with pytest.warns(UserWarning, match="give degrees"):
+        wedge(angle=0.9)
+    left, right = (fw.Flank([[1, 2]], [[-0.01, 0.0]]), fw.Flank([[3, 4]], [[0.01, 0.0]]))
+    with pytest.warns(UserWarning, match="left and right are exchanged"):
+        wedge(left=fw.Flank([[1, 2]], right.points), right=fw.Flank([[3, 4]], left.points))
+    with pytest.raises(InputError, match="the model has no sectors"):
+        wedge(right=fw.Flank([[3, 4]], right.points, sector=1))
+    blades().to_hdf5(tmp_path / "blades.h5")
+    command = ["damper", str(tmp_path / "blades.h5"), "-o", str(tmp_path / "damped.h5"),
+               "--mass", "0.05", "--mu", "0.3", "--stiffness", "2e4", "3e4",
+               "--left", "1,2", "--left-at", "-0.01,0", "--right", "3,4", "--right-at", "0.01,0"]
+    assert main([*command, "--angles", "50", "50", "--sector", "1"]) == 3
+    assert "the model has no sectors" in capsys.readouterr().err
+    assert main([*command, "--angles", "0.9", "0.9"]) == 0
+    assert "remark: angles" in capsys.readouterr().err
+
+
+def test_names_nearly_right(tmp_path):
+    """A group /bodies is no other data, and what it lacks no speed too many; keys of /body are none
+    of &body."""
+    wedge().to_hdf5(tmp_path / "model.h5")
+    with h5py.File(tmp_path / "model.h5", "r+") as file:
+        file.move("body", "bodies")
+    message = run(tmp_path, with_model(at(120.0)), status=3).stderr
+    assert "/bodies is nothing that is read (did you mean /body?)" in message
+    assert "rotation_speed" not in message
+    wedge().to_hdf5(tmp_path / "model.h5")
+    message = run(tmp_path, with_model(at(120.0, body={"name": ["damper"]})), status=3).stderr
+    assert "&body has no key name" in message and "gives other masses alone" in message
