@@ -47,6 +47,8 @@ module fw_case
       logical :: is_campbell = .false.
       !> Points of many disks, of which the largest counts: none is a row of the result.
       logical :: is_population = .false.
+      !> Over the residual tractions of the pairs, which other analyses have one set of.
+      logical :: is_range = .false.
    end type analysis_facts
 
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
@@ -67,7 +69,7 @@ module fw_case
       analysis_facts(is_resonance=.true., finds_frequency=.true.), &
       analysis_facts(is_campbell=.true., has_points=.false., is_balanced=.false.), &
       analysis_facts(is_population=.true., is_response=.true., is_sweep=.true.), &
-      analysis_facts(is_response=.true., is_sweep=.true.)]
+      analysis_facts(is_range=.true., is_response=.true., is_sweep=.true.)]
 
    !> What is written (group &output).
    type :: output_options

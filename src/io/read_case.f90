@@ -1,7 +1,7 @@
 !> From a namelist file to a validated case.
 module fw_read_case
    use fw_combinations, only: check_combinations
-   use fw_case, only: analyses, analysis_bounds, case_type
+   use fw_case, only: analyses, case_type
    use fw_contact_data, only: contact_type, memory_carried, memory_residual, sliding_path
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, sampling_uniform, usual_accuracy
@@ -240,7 +240,7 @@ contains
       if (reader%given('harmonics', 'accuracy')) return
       if (case%sensitivity%is_wanted()) return
       if (analyses(case%analysis)%finds_frequency .or. &
-          case%analysis == analysis_bounds .or. case%control%is_wanted()) then
+          analyses(case%analysis)%is_range .or. case%control%is_wanted()) then
          case%harmonics%n_harmonics = usual_harmonics
          call reader%amend('harmonics', 'n_harmonics', to_text(usual_harmonics))
          return
@@ -481,7 +481,7 @@ contains
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
-      if (case%analysis == analysis_bounds) call open_range(case%contact)
+      if (analyses(case%analysis)%is_range) call open_range(case%contact)
       call read_obstacle(reader, case%model%cyclic, case%contact, gap_order)
       call case%contact%turn(options%rotation_speed, options%speed_order)
       ! What finds whether anything depends on the speed looks there.
