@@ -341,6 +341,9 @@ contains
             any(abs(contact%gap_sine(i, :)) > 0.0_wp)
          if (interferes) moving(dofs_of(model, [contact%side_1(3, i), contact%side_2(3, i)])) = &
             .true.
+         ! A traction that the assembly has left does so along the face.
+         if (is_strained(contact, i)) moving(dofs_of(model, [contact%side_1(:2, i), &
+                                                            contact%side_2(:2, i)])) = .true.
       end do
       ! The ground passes no motion on.
       moving(0) = .false.
@@ -428,6 +431,18 @@ contains
       end subroutine couple_elements
 
    end subroutine find_moving_dofs
+
+   !> Whether a pair may be strained where it stands.
+   pure logical function is_strained(contact, pair)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: pair
+
+      is_strained = contact%memory == memory_residual
+      if (allocated(contact%slider_1)) is_strained = is_strained .or. &
+         abs(contact%slider_1(pair)) > 0.0_wp
+      if (allocated(contact%slider_2)) is_strained = is_strained .or. &
+         abs(contact%slider_2(pair)) > 0.0_wp
+   end function is_strained
 
    !> Half-wave symmetry is exact where nothing static acts, nor a load of an even harmonic, normal
    !> loads are constant, springs are odd, and no pair carries a static force over from an earlier

@@ -3,7 +3,9 @@
 !>
 !>   mu             dT = dT/d(mu p) p: T depends on mu y_n alone, so that dT = G_tn y_n/mu
 !>   normal load    dy_n = -1,     gap  dy_n = k_n    (constants, hence G of all harmonics)
-!>   k_t, k_n       dy = y/k
+!>   k_t, k_n       dy = y/k, of pairs that start from k_t times a slider dy_t = (y_t - x_start)/k_t
+!>   slider         dy_t = -k_t in harmonic 0: inputs and start that move alike change no force
+!>   residual       dT in harmonic 0, with the inputs held
 !>   c, p_0         of curved normal laws, dy_n = -p/(p' c): the pressure is in proportion to them,
 !>                  and T to mu p, so that dy_n = -p/(p' mu) by mu
 !>   v_0, mu_d      of friction at a sliding speed, and mu where it weakens with the speed: dT with
@@ -23,11 +25,10 @@ module fw_parameter_slopes
    use fw_fourier, only: fourier_type, new_fourier
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
-   use fw_pair_law, only: pair_law
    use fw_parameters, only: blade_frequency, friction_coefficient, gap, harmonic_scale, &
       is_of_elements, is_of_matrices, is_of_sectors, is_per_pair, normal_coefficient, normal_load, &
-      normal_stiffness, parameter_group, parameter_key, reference_force, spring_coefficient, &
-      static_scale, tangential_stiffness
+      normal_stiffness, parameter_group, parameter_key, reference_force, slider_1, slider_2, &
+      spring_coefficient, static_scale, tangential_stiffness
    use fw_recovery, only: observe
    implicit none (type, external)
    private
@@ -136,27 +137,11 @@ contains
             work%x_start = source%x_start
             work%mean = source%mean
             work%rate = source%rate
-            call take_shares(self, state)
             call self%law%evaluate(self%fourier, work)
             call self%law%linearize(self%fourier, work)
          end associate
       end associate
    end subroutine prepare
-
-   !> Residual tractions may have changed since the twin was made.
-   subroutine take_shares(self, state)
-      class(slope_finder), intent(inout) :: self
-      type(balance_state), intent(in) :: state
-
-      select type (law => state%problem%forces%entry(state%problem%forces%pairs)%law)
-      class is (pair_law)
-         if (.not. allocated(law%share)) return
-         select type (twin => self%law)
-         class is (pair_law)
-            call twin%take_shares(law%share)
-         end select
-      end select
-   end subroutine take_shares
 
    subroutine find_work_at_rest(self, state)
       class(slope_finder), intent(inout) :: self
@@ -241,7 +226,6 @@ contains
             call input_of(self, state, parameter, input)
             call multiply_twin(work, i, input, output)
          end if
-         if (parameter%number == tangential_stiffness) call add_start(self, i, output)
          ! mu acts on friction alone, and not on what presses.
          if (parameter%number == friction_coefficient) output(:, 3) = 0.0_wp
          do c = 1, 3
@@ -255,29 +239,6 @@ contains
          end do
       end associate
    end subroutine by_pair
-
-   !> Where a pair starts from goes with its stiffness: x = k slider.
-   subroutine add_start(self, pair, output)
-      class(slope_finder), intent(in) :: self
-      integer, intent(in) :: pair
-      real(wp), intent(inout) :: output(:, :)
-      real(wp) :: by_slider(size(output, 1), size(output, 2))
-      character(*), parameter :: key(2) = ['slider_1', 'slider_2']
-      logical :: is_known
-      integer :: c
-
-      select type (law => self%law)
-      class is (pair_law)
-         ! The stiffness of a rigid pair is no number of the pair.
-         if (.not. allocated(law%slider) .or. law%prediction%takes(pair)) return
-         do c = 1, 2
-            if (.not. law%prediction%stiffness(pair, c) > 0.0_wp) cycle
-            call law%by_constant(pair, key(c), self%fourier, self%work, by_slider, is_known)
-            if (.not. is_known) return
-            output = output + law%slider(pair, c)/law%prediction%stiffness(pair, c)*by_slider
-         end do
-      end select
-   end subroutine add_start
 
    !> Derivative of the inputs of a pair by a number of it (n_coefficients of the twin, 3).
    subroutine input_of(self, state, parameter, input)
@@ -311,7 +272,11 @@ contains
             do c = 1, 2
                if (p%order_of(i, c) > 0) cycle
                call elongation(self, state, i, c, input(:, c))
+               input(1, c) = input(1, c) - self%work%x_start(i, c)/p%stiffness(i, c)
             end do
+         case (slider_1, slider_2)
+            c = merge(1, 2, parameter%number == slider_1)
+            if (p%order_of(i, c) == 0) input(1, c) = -p%stiffness(i, c)
          case (normal_coefficient)
             if (pressing == 'normal_coefficient') call press_in_proportion( &
                self, i, parameter%value, input(:, 3))

@@ -48,8 +48,8 @@ module fw_case
       logical :: is_campbell = .false.
       !> Points of many disks, of which the largest counts: none is a row of the result.
       logical :: is_population = .false.
-      !> Over all residual tractions that pairs may bear.
-      logical :: ranges_residuals = .false.
+      !> Over the residual tractions of the pairs, which other analyses have one set of.
+      logical :: is_range = .false.
       !> A free motion, from a start that is given.
       logical :: is_ringdown = .false.
    end type analysis_facts
@@ -72,7 +72,7 @@ module fw_case
       analysis_facts(is_resonance=.true., finds_frequency=.true.), &
       analysis_facts(is_campbell=.true., has_points=.false., is_balanced=.false.), &
       analysis_facts(is_population=.true., is_response=.true., is_sweep=.true.), &
-      analysis_facts(ranges_residuals=.true., is_response=.true., is_sweep=.true.), &
+      analysis_facts(is_range=.true., is_response=.true., is_sweep=.true.), &
       analysis_facts(is_ringdown=.true., has_points=.false., is_balanced=.false., &
                      is_integrated=.true.)]
 

@@ -10,8 +10,8 @@ module fw_run_bounds
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
+   use fw_moved_parameter, only: moved_parameter
    use fw_one_level, only: one_level
-   use fw_pair_law, only: pair_law
    use fw_parameters, only: residual_share
    use fw_point, only: point_type
    use fw_response_rows, only: is_of_pairs, wear_volume
@@ -30,6 +30,8 @@ module fw_run_bounds
       class(one_level), allocatable :: strategy
       !> The case, with the derivatives that the search needs and the shares of now.
       class(case_type), allocatable :: one
+      !> Gives the problem other shares.
+      type(moved_parameter), allocatable :: mover
       type(point_request) :: request
       !> Responses that were solved at this frequency.
       integer :: n_solved = 0
@@ -73,6 +75,11 @@ contains
          allocate (solver%strategy)
          call solver%strategy%start(solver%one, error)
          if (allocated(error)) return
+         allocate (solver%mover)
+         call solver%mover%take(solver%one, residual_share, .false.)
+         solver%mover%filter_harmonics = case%harmonics%filter_harmonics
+         ! A factor of shares, which are 0 to begin with, is none.
+         solver%mover%built = 1.0_wp
       end associate
       self%place = sweep_places(case)
       none = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -142,7 +149,8 @@ contains
       if (.not. more) return
       associate (solver => self%solver)
          solver%n_solved = 0
-         call solver%put_shares(spread(0.0_wp, 1, case%contact%n_pairs))
+         call solver%put_shares(spread(0.0_wp, 1, case%contact%n_pairs), error)
+         if (allocated(error)) return
          solver%request = new_request(solver%one, self%place(self%n_done + 1), observer)
          call solver%strategy%solve_in_time(solver%one, solver%request, point, error)
          if (allocated(error)) return
@@ -218,7 +226,8 @@ contains
       do while (at < 1.0_wp)
          call go_back(self, here)
          call self%put_shares(merge(shares, from%t + (at + step)*(shares - from%t), &
-                                    at + step >= 1.0_wp))
+                                    at + step >= 1.0_wp), error)
+         if (allocated(error)) return
          call self%strategy%solve_in_time(self%one, self%request, point, error)
          if (allocated(error)) return
          self%n_solved = self%n_solved + 1
@@ -233,18 +242,17 @@ contains
       end do
    end subroutine solve_on_the_way
 
-   !> The shares of the problem that is solved, and of the case.
-   subroutine put_shares(self, shares)
+   !> The shares of the problem that is solved, and of the case. The twin of the law that slopes are
+   !> found by (fw_parameter_slopes) keeps its own, which those by shares do not depend on.
+   subroutine put_shares(self, shares, error)
       class(balanced_shares), intent(inout) :: self
       real(wp), intent(in) :: shares(:)
+      type(error_type), allocatable, intent(out) :: error
 
       self%one%contact%residual = shares
-      associate (forces => self%strategy%level%problem%forces)
-         select type (law => forces%entry(forces%pairs)%law)
-         class is (pair_law)
-            call law%take_shares(shares)
-         end select
-      end associate
+      self%mover%body%contact%residual = shares
+      ! Each pair its own: no one value stands for all.
+      call self%mover%change(self%strategy%level%system, 0.0_wp, error)
    end subroutine put_shares
 
    !> Value and slope of a point at the shares of now; not known where it has none.
@@ -289,7 +297,7 @@ contains
       integer :: n_failed
 
       associate (n => self%n_done, group => self%group)
-         call self%solver%strategy%describe(case, run%state, run%summary, message)
+         call self%solver%strategy%describe(self%solver%one, run%state, run%summary, message)
          if (len(message) > 0) call run%observer%on_message(message)
          group%range = group%range(:, :n)
          group%residual = group%residual(:, :, :n)

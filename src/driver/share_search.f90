@@ -50,18 +50,25 @@ module fw_share_search
       !> Responses that are known, the centre first, and shares that could not be solved for.
       integer :: n_known = 0, n_failed = 0
       type(share_point), allocatable :: known(:)
+      !> Responses after which no further one is solved.
+      integer, private :: most = huge(1)
    contains
       procedure :: find
+      procedure, private :: begin_at
       procedure, private :: go_to
       procedure, private :: descend
+      procedure, private :: search_along
    end type share_search
 
    !> Part of the value that the slope may still promise at an end: what is left there is of second
    !> order in it.
    real(wp), parameter :: enough = 1.0e-7_wp
-   !> Shares that are one and the same.
-   real(wp), parameter :: same = 1.0e-12_wp
-   integer, parameter :: most_steps = 20, most_trials = 5
+   !> Shares that are one and the same, and slopes that are round-off of the value.
+   real(wp), parameter :: same = 1.0e-12_wp, round_off = 1.0e-10_wp
+   integer, parameter :: most_steps = 15, most_trials = 8
+   !> Starts that each search has, and responses for each pair that four starts may take, with
+   !> enough for the line searches of few pairs.
+   integer, parameter :: usual_starts = 4, most_for_pair = 15, fewest = 30
 
 contains
 
@@ -70,22 +77,24 @@ contains
       class(share_search), intent(inout) :: self
       class(share_solver), intent(inout) :: solver
       type(share_point), intent(in) :: centre
-      !> The centre, both ends of its slope, and corners that are drawn.
+      !> The centre, both ends of its slope, and shares that are drawn.
       integer, intent(in) :: n_starts
       type(error_type), allocatable, intent(out) :: error
-      integer :: side, start, at, state
+      integer :: side, start, from(2), state
 
       allocate (self%known(8))
       self%known(1) = centre
+      call drop_round_off(self%known(1))
       self%n_known = 1
-      ! The same corners at each frequency: no row depends on those before.
+      self%most = max(fewest, most_for_pair*size(centre%t))*n_starts/usual_starts
+      ! The same draws at each frequency: no row depends on those before.
       state = 1
       do start = 1, n_starts
-         call self%go_to(solver, 1, start_of(centre, start, state), at, error)
+         call self%begin_at(solver, start, state, from, error)
          if (allocated(error)) return
-         if (at == 0) cycle
          do side = 1, 2
-            call self%descend(solver, side, at, error)
+            if (from(side) == 0) cycle
+            call self%descend(solver, side, from(side), error)
             if (allocated(error)) return
          end do
       end do
@@ -94,29 +103,54 @@ contains
       end associate
    end subroutine find
 
-   !> Shares of a start; those that the centre does not depend on stay in the middle.
-   function start_of(centre, number, state) result(t)
-      type(share_point), intent(in) :: centre
+   !> Slopes by shares that do nothing.
+   pure subroutine drop_round_off(point)
+      type(share_point), intent(inout) :: point
+
+      where (abs(point%slope) <= round_off*abs(point%value)) point%slope = 0.0_wp
+   end subroutine drop_round_off
+
+   !> Places where the descents to the lowest and to the highest value of a start begin; 0 where
+   !> there is none. Of what is drawn they are the lowest and the highest: where all pairs stick,
+   !> the vibration depends on no share, and many draws say nothing.
+   subroutine begin_at(self, solver, number, state, from, error)
+      class(share_search), intent(inout) :: self
+      class(share_solver), intent(inout) :: solver
       integer, intent(in) :: number
       !> Of the numbers that are drawn.
       integer, intent(inout) :: state
-      real(wp) :: t(size(centre%t))
-      integer, parameter :: middle = 1073741824
-      integer :: i
+      integer, intent(out) :: from(2)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: t(size(self%known(1)%t))
+      integer :: at, i, k
 
-      select case (number)
-      case (1)
-         t = centre%t
-      case (2, 3)
-         t = merge(0.0_wp, sign(1.0_wp, centre%slope), abs(centre%slope) <= 0.0_wp)
+      from = 1
+      if (number == 1) return
+      if (number <= 3) then
+         associate (slope => self%known(1)%slope)
+            t = merge(0.0_wp, sign(1.0_wp, slope), abs(slope) <= 0.0_wp)
+            if (all(abs(slope) <= 0.0_wp)) t = 1.0_wp
+         end associate
          if (number == 3) t = -t
-      case default
+         call self%go_to(solver, 1, t, at, error)
+         from = at
+         return
+      end if
+      from = 0
+      do k = 1, size(t) + 2
          do i = 1, size(t)
             state = next_number(state)
-            t(i) = merge(1.0_wp, -1.0_wp, state > middle)
+            t(i) = 2.0_wp*real(state, wp)/real(huge(1), wp) - 1.0_wp
          end do
-      end select
-   end function start_of
+         call self%go_to(solver, 1, t, at, error)
+         if (allocated(error)) return
+         if (at == 0) cycle
+         if (all(abs(self%known(at)%slope) <= 0.0_wp)) cycle
+         if (from(1) == 0) from = at
+         if (self%known(at)%value < self%known(from(1))%value) from(1) = at
+         if (self%known(at)%value > self%known(from(2))%value) from(2) = at
+      end do
+   end subroutine begin_at
 
    !> Park and Miller's generator by Schrage's method, which needs no wider integers.
    pure integer function next_number(state) result(next)
@@ -145,6 +179,7 @@ contains
          if (maxval(abs(self%known(at)%t - shares)) <= same) return
       end do
       at = 0
+      if (self%n_known + self%n_failed >= self%most) return
       call solver%solve(self%known(from), shares, found, done, error)
       if (allocated(error)) return
       if (.not. done) then
@@ -158,86 +193,130 @@ contains
       end if
       self%n_known = self%n_known + 1
       at = self%n_known
+      call drop_round_off(found)
       self%known(at) = found
    end subroutine go_to
 
-   !> Down to the lowest value (side 1) or up to the highest (2) that shares near by lead to.
+   !> Down to the lowest value (side 1) or up to the highest (2) that shares near by lead to. The
+   !> value has kinks, where a pair begins to slip or the instant of an end changes: there the least
+   !> slope between those of both sides says whether it is an end.
    subroutine descend(self, solver, side, start, error)
       class(share_search), intent(inout) :: self
       class(share_solver), intent(inout) :: solver
       integer, intent(in) :: side, start
       type(error_type), allocatable, intent(out) :: error
       type(box_steps) :: steps
-      real(wp), allocatable :: d(:), g(:)
+      real(wp), allocatable :: beyond(:), g(:), step(:)
       real(wp) :: turn
+      logical :: at_kink
       integer :: at, k, next
 
       turn = merge(1.0_wp, -1.0_wp, side == 1)
       at = start
+      at_kink = .false.
       do k = 1, most_steps
-         if (self%known(at)%is_left(side)) return
-         self%known(at)%is_left(side) = .true.
          associate (p => self%known(at))
+            if (p%is_left(side) .and. .not. at_kink) return
+            p%is_left(side) = .true.
             g = turn*p%slope
+            if (at_kink) then
+               g = least_between(g, beyond)
+               call steps%forget()
+            end if
             if (gain_left(p%t, g) <= enough*abs(p%value)) return
-            d = steps%direction(p%t, g)
+            step = max(-1.0_wp, min(1.0_wp, p%t + steps%direction(p%t, g))) - p%t
+            if (dot_product(g, step) >= 0.0_wp) return
          end associate
-         call search_along(self, solver, turn, at, d, next, error)
+         call self%search_along(solver, turn, at, step, next, beyond, error)
          if (allocated(error)) return
-         if (next == 0) return
-         call steps%learn(self%known(next)%t - self%known(at)%t, &
-                          turn*(self%known(next)%slope - self%known(at)%slope))
+         associate (p => self%known(at), q => self%known(next))
+            if (next == at .and. (at_kink .or. .not. allocated(beyond))) return
+            if (.not. (at_kink .or. allocated(beyond))) call steps%learn(q%t - p%t, &
+                                                                  turn*(q%slope - p%slope))
+            ! What is gained no more is not looked for.
+            if (next /= at .and. abs(q%value - p%value) <= 0.1_wp*enough*abs(p%value)) return
+         end associate
+         at_kink = allocated(beyond)
          at = next
       end do
    end subroutine descend
 
-   !> The first response along the projected direction that gains enough; 0 where none does.
-   subroutine search_along(self, solver, turn, at, d, next, error)
+   !> The shortest slope between two: 0 where they point at each other.
+   pure function least_between(a, b) result(g)
+      real(wp), intent(in) :: a(:), b(:)
+      real(wp) :: g(size(a))
+      real(wp) :: length, part
+
+      length = dot_product(a - b, a - b)
+      part = 1.0_wp
+      if (length > 0.0_wp) part = max(0.0_wp, min(1.0_wp, dot_product(b, b - a)/length))
+      g = part*a + (1.0_wp - part)*b
+   end function least_between
+
+   !> The best response along a step. Where the whole step goes past it, the two best ones around
+   !> it are brought together where their tangents meet, which is exact at a kink: `beyond` has the
+   !> slope on its other side then.
+   subroutine search_along(self, solver, turn, at, step, best, beyond, error)
       class(share_search), intent(inout) :: self
       class(share_solver), intent(inout) :: solver
-      real(wp), intent(in) :: turn, d(:)
+      real(wp), intent(in) :: turn, step(:)
       integer, intent(in) :: at
-      integer, intent(out) :: next
+      integer, intent(out) :: best
+      real(wp), allocatable, intent(out) :: beyond(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), parameter :: sufficient = 1.0e-4_wp, shorter = 0.25_wp
-      real(wp) :: length, shares(size(d)), step(size(d))
-      integer :: k, trial
+      real(wp), parameter :: shorter = 0.25_wp, inexact = 0.1_wp, off_ends = 0.05_wp
+      real(wp) :: length(2), slope(2), change, descent, gap, now, part, value, width
+      integer :: k, other, trial
 
-      length = 1.0_wp
-      next = 0
+      best = at
+      other = 0
+      length = 0.0_wp
+      now = 1.0_wp
       do k = 1, most_trials
-         shares = max(-1.0_wp, min(1.0_wp, self%known(at)%t + length*d))
-         step = shares - self%known(at)%t
-         call self%go_to(solver, at, shares, trial, error)
+         call self%go_to(solver, at, self%known(at)%t + now*step, trial, error)
          if (allocated(error)) return
          if (trial == 0) then
-            length = shorter*length
+            now = length(1) + shorter*(now - length(1))
             cycle
          end if
-         associate (p => self%known(at), q => self%known(trial))
-            if (turn*(q%value - p%value) <= sufficient*turn*dot_product(p%slope, step)) then
-               next = trial
+         value = turn*(self%known(trial)%value - self%known(best)%value)
+         if (value < 0.0_wp) then
+            descent = turn*dot_product(self%known(trial)%slope, step)
+            if (other == 0 .and. descent <= 0.0_wp) then
+               best = trial
                return
             end if
-            length = length*part_of(turn*(q%value - p%value), turn*dot_product(p%slope, step), &
-                                    turn*dot_product(q%slope, step))
+            ! What is behind it is between this one and the other, or between this one and the best
+            ! one until now.
+            if (other == 0 .or. descent*(length(2) - now) >= 0.0_wp) then
+               other = best
+               length(2) = length(1)
+            end if
+            best = trial
+            length(1) = now
+         else
+            other = trial
+            length(2) = now
+         end if
+         associate (p => self%known(best), q => self%known(other))
+            ! Slopes and the change of value from the best one to the other.
+            width = length(2) - length(1)
+            slope = turn*width*[dot_product(p%slope, step), dot_product(q%slope, step)]
+            change = turn*(q%value - p%value)
+            if (slope(1) >= 0.0_wp) return
+            part = 0.3_wp
+            if (slope(2) > change .and. slope(1) < change) then
+               part = (change - slope(2))/(slope(1) - slope(2))
+               gap = -part*slope(1)
+               if (gap <= enough*abs(p%value)) then
+                  beyond = turn*q%slope
+                  return
+               end if
+               if (gap <= inexact*turn*(self%known(at)%value - p%value)) return
+            end if
+            now = length(1) + max(off_ends, min(1.0_wp - off_ends, part))*width
          end associate
       end do
    end subroutine search_along
-
-   !> Where the cubic with a change of value and both slopes over the unit step is least, kept off
-   !> the ends.
-   pure real(wp) function part_of(change, first, last) result(part)
-      real(wp), intent(in) :: change, first, last
-      real(wp) :: a, b, root
-
-      a = first + last - 2.0_wp*change
-      b = 3.0_wp*change - 2.0_wp*first - last
-      part = 0.5_wp
-      ! The root with the positive second derivative, without cancellation of a small a.
-      root = b + sqrt(max(0.0_wp, b**2 - 3.0_wp*a*first))
-      if (root > tiny(1.0_wp)) part = -first/root
-      part = max(0.1_wp, min(0.7_wp, part))
-   end function part_of
 
 end module fw_share_search

@@ -577,7 +577,7 @@ contains
       end do
    end subroutine find_limits
 
-   !> What a pair has of its assembly; all else acts through the inputs.
+   !> The share of a residual traction; all else acts through the inputs.
    pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
       class(friction_law), intent(in) :: self
       integer, intent(in) :: element
@@ -592,11 +592,7 @@ contains
       if (.not. self%facts%remembers) return
       select type (room => work%room)
       type is (friction_room)
-         ! The smallest margin and pressure are those of all turns, the first one included.
-         call self%by_memory(element, name, fourier, room%margin(element) >= 0.0_wp .and. &
-                             work%pressure(element) > 0.0_wp .and. &
-                             .not. room%reach(element) > 0.0_wp, room%reach(element), force, &
-                             is_known)
+         call self%by_share(element, name, fourier, room%reach(element), force, is_known)
       end select
    end subroutine by_constant
 

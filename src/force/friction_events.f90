@@ -195,7 +195,7 @@ contains
       end select
    end subroutine coefficients
 
-   !> What a pair has of its assembly; all else acts through the inputs.
+   !> The share of a residual traction; all else acts through the inputs.
    pure subroutine by_constant(self, element, name, fourier, work, force, is_known)
       class(friction_by_events), intent(in) :: self
       integer, intent(in) :: element
@@ -210,9 +210,7 @@ contains
       if (.not. self%facts%remembers) return
       select type (room => work%room)
       class is (event_room)
-         call self%by_memory(element, name, fourier, room%paths%closed(element) .and. &
-                             .not. room%paths%moved(element), room%paths%reach(element), force, &
-                             is_known)
+         call self%by_share(element, name, fourier, room%paths%reach(element), force, is_known)
       end select
    end subroutine by_constant
 

@@ -41,8 +41,7 @@ module fw_pair_law
       procedure :: take_speeds
       procedure :: take_memory
       procedure :: take_start
-      procedure :: take_shares
-      procedure :: by_memory
+      procedure :: by_share
       procedure :: note_curves
       procedure :: reserve
       procedure :: reserve_normal
@@ -99,16 +98,8 @@ contains
          if (allocated(contact%slider_1)) self%slider(:, 1) = contact%slider_1
          if (allocated(contact%slider_2)) self%slider(:, 2) = contact%slider_2
       end if
-      if (contact%memory == memory_residual) call self%take_shares(contact%residual)
+      if (contact%memory == memory_residual) self%share = contact%residual
    end subroutine take_memory
-
-   !> Other shares of the residual tractions (n_elements), of a law that is built.
-   pure subroutine take_shares(self, shares)
-      class(pair_law), intent(inout) :: self
-      real(wp), intent(in) :: shares(:)
-
-      self%share = shares
-   end subroutine take_shares
 
    !> Before an evaluation: the march of pairs that are unstrained elsewhere starts there. The
    !> stiffness is that of now, which a rigid law has from the structure.
@@ -119,35 +110,24 @@ contains
       if (allocated(self%slider)) work%x_start = self%prediction%stiffness(:, :2)*self%slider
    end subroutine take_start
 
-   !> `by_constant` of laws that remember, for what pairs have of their assembly: the tangential
-   !> force of a pair that never slips is y - x, and x is k times the slider, or between its ends.
-   pure subroutine by_memory(self, element, name, fourier, is_unmoved, reach, force, is_known)
+   !> `by_constant` of the share of a residual traction: the tangential force is y - x, and x is
+   !> between its ends.
+   pure subroutine by_share(self, element, name, fourier, reach, force, is_known)
       class(pair_law), intent(in) :: self
       integer, intent(in) :: element
       character(*), intent(in) :: name
       type(fourier_type), intent(in) :: fourier
-      !> Whether nothing has moved the pair from its start; half of the distance between the ends
-      !> of its residual traction, 0 where the march says it [force].
-      logical, intent(in) :: is_unmoved
+      !> Half of the distance between the ends, 0 where the march says the traction [force].
       real(wp), intent(in) :: reach
       !> (n_coefficients, n_components).
       real(wp), intent(inout) :: force(:, :)
       logical, intent(out) :: is_known
-      integer :: c
 
       force = 0.0_wp
-      is_known = any(name == [character(8) :: 'slider_1', 'slider_2', 'residual'])
+      is_known = name == 'residual'
       if (.not. (is_known .and. fourier%has_constant())) return
-      do c = 1, 2
-         if (.not. self%present(c, element)) cycle
-         if (name == 'residual') then
-            force(fourier%column(1), c) = -reach
-         else if (is_unmoved .and. name == merge('slider_1', 'slider_2', c == 1)) then
-            ! Others forget where they started.
-            force(fourier%column(1), c) = -self%prediction%stiffness(element, c)
-         end if
-      end do
-   end subroutine by_memory
+      where (self%present(1:2, element)) force(fourier%column(1), 1:2) = -reach
+   end subroutine by_share
 
    !> Of gaps and normal loads, where the rotation speed follows the frequency.
    pure subroutine take_growth(contact, prediction)

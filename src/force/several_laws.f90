@@ -38,7 +38,6 @@ module fw_several_laws
       procedure :: join
       procedure :: leans
       procedure :: take_prediction
-      procedure :: take_shares
       procedure :: reserve
       procedure :: evaluate
       procedure :: evaluate_free
@@ -120,7 +119,6 @@ contains
             call join_growth(law%prediction%gap_growth, at, n, self%prediction%gap_growth)
             call join_growth(law%prediction%load_growth, at, n, self%prediction%load_growth)
             call join_speeds(law%prediction%speed, at, n, self%prediction%speed)
-            call join_speeds(law%slider, at, n, self%slider)
             call join_motion(law%prediction%gap_motion, at, n, self%prediction%gap_motion)
             self%prediction%own(at) = input_facts(law%prediction%order, law%prediction%by_time, &
                                                   law%prediction%takes_balance, &
@@ -204,7 +202,7 @@ contains
       joined(at) = growth
    end subroutine join_growth
 
-   !> Velocities of side 2, or sliders, of some pairs among all.
+   !> Velocities of side 2 of some pairs among all.
    pure subroutine join_speeds(speed, at, n, joined)
       real(wp), allocatable, intent(in) :: speed(:, :)
       integer, intent(in) :: at(:), n
@@ -325,18 +323,6 @@ contains
          end associate
       end do
    end subroutine take_prediction
-
-   !> Each member those of its pairs.
-   pure subroutine take_shares(self, shares)
-      class(several_laws), intent(inout) :: self
-      real(wp), intent(in) :: shares(:)
-      integer :: m
-
-      self%share = shares
-      do m = 1, size(self%member)
-         call self%member(m)%law%take_shares(shares(self%member(m)%pair))
-      end do
-   end subroutine take_shares
 
    !> Room of its own for each member, too.
    subroutine reserve(self, fourier, work)
@@ -481,6 +467,7 @@ contains
       work%pressure(at) = own%pressure
       work%turns(at) = own%turns
       work%x(at, :) = own%x
+      work%x_start(at, :) = own%x_start
       work%state(at) = own%state
       if (own%measures_slip) work%slip(at) = own%slip
    end subroutine give_forces

@@ -141,8 +141,7 @@ contains
       end select
    end subroutine check_of_pairs
 
-   !> What pairs have of their assembly where the case says so. With two directions a pair may come
-   !> to rest on the way that its start decides on: the derivative of that way is not there.
+   !> What pairs have of their assembly where the case says so.
    subroutine check_of_assembly(contact, number, reason)
       type(contact_type), intent(in) :: contact
       integer, intent(in) :: number
@@ -157,8 +156,6 @@ contains
          if (.not. allocated(contact%slider_1) .and. number == slider_1 .or. &
              .not. allocated(contact%slider_2) .and. number == slider_2) then
             reason = 'contact%'//trim(key)//' is not given (values of 0 serve)'
-         else if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, 1))) then
-            reason = 'its derivative is not known of pairs with two tangential directions'
          end if
       end select
    end subroutine check_of_assembly

@@ -240,7 +240,7 @@ contains
       if (reader%given('harmonics', 'accuracy')) return
       if (case%sensitivity%is_wanted()) return
       if (analyses(case%analysis)%finds_frequency .or. &
-          analyses(case%analysis)%ranges_residuals .or. case%control%is_wanted()) then
+          analyses(case%analysis)%is_range .or. case%control%is_wanted()) then
          case%harmonics%n_harmonics = usual_harmonics
          call reader%amend('harmonics', 'n_harmonics', to_text(usual_harmonics))
          return
@@ -483,7 +483,7 @@ contains
       call stand_alone(options, raw, case%model%cyclic)
       call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
-      if (analyses(case%analysis)%ranges_residuals) call open_range(case%contact)
+      if (analyses(case%analysis)%is_range) call open_range(case%contact)
       call read_obstacle(reader, case%model%cyclic, case%contact, gap_order)
       call case%contact%turn(options%rotation_speed, options%speed_order)
       ! What finds whether anything depends on the speed looks there.

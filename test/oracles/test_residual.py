@@ -204,7 +204,24 @@ def test_slider_parameter(tmp_path):
             own = np.reshape(found[f"contact_{name}"], -1)
             assert np.abs(own - slope).max() < DERIVATIVE * np.abs(slope).max(), name
     slips = merged(groups, {"load": {"cosine": [9.0, 0.7, 0.2, 0.0, 0.0, 0.0]}})
-    assert not solved(tmp_path, merged(slips, asked))["contact_slider_1"].any()
+    found = solved(tmp_path, merged(slips, asked))
+    assert np.abs(found["contact_slider_1"]).max() < 1e-12
+
+
+def test_slider_of_two_directions(tmp_path):
+    """A pair that shakes down on the way that its start decides on."""
+    groups = merged(slider(), INSTANTS)
+    groups = merged(groups, {"contact": {"side_1": [4, 6, 5], "slider_1": 0.008,
+                                         "slider_2": -0.005}, "solver": {"tolerance": 1e-12}})
+    found = solved(tmp_path, merged(groups, {"sensitivity": {
+        "parameters": ["contact%slider_1", "contact%slider_2"], "quantities": "largest"}}))
+    assert found["contact/fraction"][0, 0, 0] > 0.9
+    for name, value, step in (("slider_1", 0.008, 2e-6), ("slider_2", -0.005, 2e-6)):
+        side = [solved(tmp_path, merged(groups, {"contact": {name: value + k * step}}))[
+            "amplitude"][0] for k in (-2, -1, 1, 2)]
+        slope = (8.0 * (side[2] - side[1]) - (side[3] - side[0])) / (12.0 * step)
+        own = np.reshape(found[f"contact_{name}"], -1)
+        assert np.abs(own - slope).max() < 1e-5 * np.abs(slope).max(), name
 
 
 @pytest.mark.parametrize(("change", "words"), [
@@ -245,7 +262,7 @@ def bounds(folder, groups, **more):
         return {name: np.asarray(values) for name, values in file["bounds"].items()}
 
 
-@pytest.mark.parametrize("name", ["v9"])
+@pytest.mark.parametrize("name", ["v8", "v9"])
 def test_range(name, tmp_path):
     """Both ends of the reference, which is of all corners and of descents from random shares, in
     few solutions."""
@@ -259,6 +276,20 @@ def test_range(name, tmp_path):
     for key in ("lowest", "highest"):
         there = solved(tmp_path, at_shares(groups, point["omega"], found[f"residual_{key}"][0]))
         assert abs(amplitude(there) / found[key][0] - 1.0) < tolerance
+
+
+def test_range_over_frequencies(tmp_path):
+    """A row of several is what a run of its frequency alone gives, and the points are the centre."""
+    groups, point, tolerance = reference("v8")
+    sweep = {"start": 0.97 * point["omega"], "end": point["omega"], "n_points": 3}
+    found = bounds(tmp_path, groups, sweep=sweep)
+    with h5py.File(tmp_path / "case.h5") as file:
+        along = np.hypot(file["coefficients"][:, 1, 0], file["coefficients"][:, 2, 0])
+    assert np.abs(along / found["centre"] - 1.0).max() < 1e-12
+    assert abs(found["highest"][-1] / point["highest"] - 1.0) < tolerance
+    assert abs(found["lowest"][-1] / point["lowest"] - 1.0) < tolerance
+    assert (found["lowest"] <= found["centre"]).all()
+    assert (found["centre"] <= found["highest"]).all()
 
 
 def test_range_of_friction_energy(tmp_path):
@@ -284,3 +315,22 @@ def test_range_of_friction_energy(tmp_path):
 def test_refusals_of_ranges(change, words, tmp_path):
     groups = merged(slider(), {"case": {"analysis": "bounds"}, "sweep": {"end": 25.0, "n_points": 3}})
     assert words in run(tmp_path, merged(groups, change), status=3).stderr
+
+
+def test_traction_moves_what_no_load_moves(tmp_path):
+    """A mass beside the one that vibrates, which only the residual traction of its pair moves."""
+    groups = {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 1.0], "stiffness": [900.0, 0.0, 0.0, 400.0],
+                  "rayleigh_stiffness": 1e-3},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [2, 0, 0], "mu": 0.5,
+                    "normal_load": 4.0, "tangential_stiffness": 100.0},
+        "load": {"cosine": [1.0, 0.0]}, "harmonics": {"n_harmonics": 1},
+        "sweep": {"start": 20.0}, "solver": {"tolerance": 1e-12}, "output": {"observe": [1, 2]}}
+    # u k_t - z = -k u with z at the end of P - mu N .. P + mu N.
+    for share in (-1.0, 0.5):
+        found = solved(tmp_path, merged(groups, {"contact": {"memory": "residual",
+                                                             "residual": share}}))
+        assert abs(found["coefficients"][0, 0, 1] - share * 2.0 / 400.0) < 1e-12
+    found = solved(tmp_path, merged(groups, {"contact": {"slider_1": 0.01}}))
+    assert abs(found["coefficients"][0, 0, 1] - 1.0 / 500.0) < 1e-12

@@ -6,6 +6,26 @@ from __future__ import annotations
 import numpy as np
 
 
+def march(y, q):
+    """Coulomb's law from instant to instant, of a second turn (which repeats, as turns of one
+    direction do): nan where it slips or is open, else 0; the last instant that moved x (-1: none),
+    and the direction of slip there, 0 where it opened."""
+    x, since, pull = 0.0, -1, 0.0
+    state, origin, side = np.zeros(len(y)), np.full(len(y), -1), np.zeros(len(y))
+    for turn in range(2):
+        for k, (now, limit) in enumerate(zip(y, q)):
+            if limit < 0.0:
+                x, since, pull, slips = now, k, 0.0, True
+            elif abs(now - x) > limit:
+                pull = 1.0 if now > x else -1.0
+                x, since, slips = now - pull * limit, k, True
+            else:
+                slips = False
+            if turn == 1:
+                state[k], origin[k], side[k] = np.nan if slips else 0.0, since, pull
+    return state, origin, side
+
+
 class Balance:
     """K, C, M (n, n), rows of the pairs along t and n (n_pairs, n), their constants (n_pairs), loads
     (2H+1, n) and instants. `wrong` leaves dP out of z: a variant that tests are to notice."""
@@ -49,29 +69,22 @@ class Balance:
             z_n = mu * (left * E[a] - right * E[b])
             rows_t, rows_n = E - z_t, -np.ones((len(E), 1)) * z_n
             return y_t - (left * low + right * high), rows_t, rows_n, 0.5 * (high - low)
-        T, by_t, by_n = np.zeros(len(E)), np.zeros_like(E), np.zeros_like(E)
-        x, x_t, x_n = 0.0, np.zeros(E.shape[1]), np.zeros(E.shape[1])
-        for _ in range(3):
-            before = x
-            for k in range(len(E)):
-                limit, d = max(q[k], 0.0), y_t[k] - x
-                if y_n[k] >= 0.0:
-                    T[k], by_t[k], by_n[k] = 0.0, 0.0, 0.0
-                elif abs(d) > limit:
-                    T[k], by_t[k], by_n[k] = np.sign(d) * limit, 0.0, -np.sign(d) * mu * E[k]
-                else:
-                    T[k], by_t[k], by_n[k] = d, E[k] - x_t, -x_n
-                    continue
-                x, x_t, x_n = y_t[k] - T[k], E[k] - by_t[k], -by_n[k]
-            if x == before:
-                break
+        T, since, pull = march(y_t.tolist(), q.tolist())
+        stands = since >= 0
+        at, slips = np.where(stands, since, 0), np.isnan(T)
+        # Behind the last motion x stands: at y_t - pull q, or at y_t where it opened.
+        x = y_t[at] - pull * q[at]
+        T = np.where(slips, pull * np.maximum(q, 0.0), y_t - np.where(stands, x, 0.0))
+        by_t = np.where(slips[:, None], 0.0, E - np.where(stands[:, None], E[at], 0.0))
+        by_n = -(mu * pull)[:, None] * np.where(slips[:, None], E, E[at])
         return T, by_t, by_n, 0.0
 
-    def residual(self, u, Z, shares):
-        """Residual, its derivative, dR by the shares, and which pairs a traction holds."""
+    def residual(self, u, Z, shares, alone=False):
+        """Residual (`alone`: nothing else), its derivative, dR by the shares, and which pairs a
+        traction holds."""
         nc, n = u.shape
         R = Z @ u.ravel() - self.load.ravel()
-        J = Z.copy().reshape(nc, n, nc, n)
+        J = None if alone else Z.copy().reshape(nc, n, nc, n)
         by_share = np.zeros((nc, n, len(shares)))
         held = np.zeros(len(shares), bool)
         R = R.reshape(nc, n)
@@ -82,12 +95,16 @@ class Balance:
             T, by_t, by_n, reach = self.force(i, y_t, y_n, share)
             bears = y_n < 0.0
             R += np.outer(self.A @ T, d) + np.outer(self.A @ np.where(bears, y_n, 0.0), e)
+            if alone:
+                continue
             G_t, G_n = self.kt[i] * (self.A @ by_t), self.kn[i] * (self.A @ by_n)
             N = self.kn[i] * (self.A * bears) @ self.E
             J += np.einsum("p,aq,r->apqr", d, G_t, d) + np.einsum("p,aq,r->apqr", d, G_n, e)
             J += np.einsum("p,aq,r->apqr", e, N, e)
             by_share[0, :, i] = -reach * d
             held[i] = reach > 0.0
+        if alone:
+            return R.ravel()
         return R.ravel(), J.reshape(nc * n, nc * n), by_share.reshape(nc * n, -1), held
 
     def solve(self, omega, shares, u=None, tolerance=1e-12):
@@ -95,16 +112,21 @@ class Balance:
         Z = self.stiffness(omega)
         u = np.zeros_like(self.load) if u is None else u.copy()
         scale = np.abs(self.load).max()
-        for _ in range(40):
+        for _ in range(25):
             R, J, _, _ = self.residual(u, Z, shares)
             size = np.abs(R).max()
             if size <= tolerance * scale:
                 return u
-            step = np.linalg.solve(J, -R).reshape(u.shape)
-            for k in range(8):
+            try:
+                step = np.linalg.solve(J, -R).reshape(u.shape)
+            except np.linalg.LinAlgError:
+                return None
+            for k in range(6):
                 trial = u + 0.5**k * step
-                if np.abs(self.residual(trial, Z, shares)[0]).max() < size:
+                if np.abs(self.residual(trial, Z, shares, alone=True)).max() < size:
                     break
+            else:
+                return None
             u = trial
         return None
 
@@ -119,7 +141,7 @@ class Balance:
                 u, at = found, to
                 continue
             step *= 0.5
-            if step < 1.0 / 64.0:
+            if step < 1.0 / 16.0:
                 return None
         return u
 

@@ -39,10 +39,10 @@ from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
            "half_power_damping", "main", "plot_backbone", "plot_blades", "plot_bounds",
-           "plot_calibration", "plot_campbell", "plot_campbell_result", "plot_content", "plot_convergence",
-           "plot_cycle", "plot_damper", "plot_damping", "plot_envelope", "plot_flanks",
-           "plot_force", "plot_haigh", "plot_harmonics", "plot_hysteresis", "plot_mission",
-           "plot_mode", "plot_nodal_diameters", "plot_optimum", "plot_population", "plot_resonance",
-           "plot_response", "plot_responses", "plot_ringdown", "plot_safe", "plot_sensitivity",
-           "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",
-           "read_damping", "read_response"]
+           "plot_calibration", "plot_campbell", "plot_campbell_result", "plot_content",
+           "plot_convergence", "plot_cycle", "plot_damper", "plot_damping", "plot_envelope",
+           "plot_flanks", "plot_force", "plot_haigh", "plot_harmonics", "plot_hysteresis",
+           "plot_mission", "plot_mode", "plot_nodal_diameters", "plot_optimum", "plot_population",
+           "plot_resonance", "plot_response", "plot_responses", "plot_ringdown", "plot_safe",
+           "plot_sensitivity", "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution",
+           "plot_wear_maps", "read_damping", "read_response"]
