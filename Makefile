@@ -11,6 +11,7 @@ SHELL := /bin/bash
 .PHONY: parameters family
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare cylinder damper good-for disk mistuned-disk paper
+.PHONY: measured higher-modes
 .PHONY: thresholds
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
@@ -184,6 +185,17 @@ disk: build ## tables and pictures of docs/shrouded_disk.md
 mistuned-disk: build ## figures and pictures of docs/mistuned_disk.md
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk.mistuned
 	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk.amplification
+
+DATA ?=
+BEAM := PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) example/brake_reuss
+
+measured: build ## the measured beam in docs/brake_reuss.md; DATA=ForcedFrequencyResponses.mat
+	$(BEAM)/brake_reuss.py $(DATA) --folder $(BUILD)/brake_reuss --document docs/brake_reuss.md
+	cp $(BUILD)/brake_reuss/brake_reuss.png docs/images/brake_reuss.png
+	$(BEAM)/attempts.py $(DATA) --document docs/brake_reuss.md
+
+higher-modes: build ## prediction of the higher modes of that beam, in docs/brake_reuss.md
+	$(BEAM)/higher_modes.py --document docs/brake_reuss.md
 
 BEFORE ?=
 rest: build ## where pairs of the velocity law come to rest, also of a program BEFORE

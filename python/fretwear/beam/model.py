@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -92,8 +93,9 @@ class ReducedBeam:
             raise ParameterError(f"ReducedBeam: {', '.join(sorted(wrong))} needs another "
                                  "reduction; call generate()")
         p = self.full.parameters
+        others: dict[str, Any] = dict(joint)
         parameters = replace(
-            p, **joint, young=stiffness * p.young,
+            p, **others, young=stiffness * p.young,
             suspension=float(np.sqrt(stiffness)) * p.suspension,
             normal_stiffness=stiffness * p.normal_stiffness,
             tangential_stiffness=stiffness * p.tangential_stiffness)
@@ -154,23 +156,24 @@ def build_full(parameters: BeamParameters) -> FullBeam:
     lap = np.linspace(p.arm, p.arm + p.lap, p.lap_elements + 1)
     left, right = np.concatenate((arm, lap[1:])), np.concatenate((lap, p.length - arm[-2::-1]))
     n = 3 * (len(left) + len(right))
-    mass, stiffness = sp.lil_array((n, n)), sp.lil_array((n, n))
+    # Some hundred dofs: dense matrices are made faster than sparse ones.
+    mass, stiffness = np.zeros((n, n)), np.zeros((n, n))
+    steps = {False: p.arm / p.arm_elements, True: p.cell}
     for places, first, above in ((left, 0, 1.0), (right, 3 * len(left), -1.0)):
+        # In the lap the axes of both halves lie a quarter of the thickness off the interface.
+        kinds = {thinner: element_matrices(
+            Section(p.width, (0.5 if thinner else 1.0) * p.thickness, p.young, p.poisson,
+                    p.density), step, 0.25 * p.thickness * above if thinner else 0.0)
+            for thinner, step in steps.items()}
         for k, (start, end) in enumerate(zip(places, places[1:])):
-            thinner = p.arm < 0.5 * (start + end) < p.arm + p.lap
-            section = Section(p.width, (0.5 if thinner else 1.0) * p.thickness, p.young,
-                              p.poisson, p.density)
+            one = kinds[bool(p.arm < 0.5 * (start + end) < p.arm + p.lap)]
             own = slice(first + 3 * k, first + 3 * k + 6)
-            # In the lap the axes of both halves lie a quarter of the thickness off the interface.
-            one = element_matrices(section, end - start,
-                                   0.25 * p.thickness * above if thinner else 0.0)
             mass[own, own] += one[0]
             stiffness[own, own] += one[1]
     return _joined(p, left, mass, stiffness)
 
 
-def _joined(p: BeamParameters, left: Floats, mass: sp.lil_array, stiffness: sp.lil_array
-            ) -> FullBeam:
+def _joined(p: BeamParameters, left: Floats, mass: Floats, stiffness: Floats) -> FullBeam:
     """With what acts at nodes: the lap, bolts, the driven point, the suspension."""
     n, n_lap = mass.shape[0], p.lap_elements + 1
     # First dofs of the nodes of the lap, of the left half and of the right one below them.
@@ -185,17 +188,17 @@ def _joined(p: BeamParameters, left: Floats, mass: sp.lil_array, stiffness: sp.l
         if not slips[j]:
             _tie(stiffness, upper[j], lower[j], p.tangential_stiffness * cell[j])
     for place_of_bolt in (-p.bolt_distance, 0.0, p.bolt_distance):
-        j = int(np.abs(place - place_of_bolt).argmin())
-        for node in (upper[j], lower[j]):
+        at = int(np.abs(place - place_of_bolt).argmin())
+        for node in (upper[at], lower[at]):
             for dof in (node, node + 1):
                 mass[dof, dof] += 0.5 * p.bolt_mass
     drive = _row(p, left, n)
-    mass = sp.lil_array(mass + p.drive_mass * np.outer(drive, drive))
+    mass += p.drive_mass * np.outer(drive, drive)
     whole = p.density * p.width * p.thickness * p.length + 3.0 * p.bolt_mass + p.drive_mass
     for node in (0, n - 3):
         for dof in (node, node + 1):
             stiffness[dof, dof] += 0.5 * whole * (2.0 * np.pi * p.suspension)**2
-    rows = sp.lil_array((int(slips.sum()), n))
+    rows = np.zeros((int(slips.sum()), n))
     for k, j in enumerate(np.flatnonzero(slips)):
         rows[k, upper[j]], rows[k, lower[j]] = 1.0, -1.0
     return FullBeam(p, sp.csr_array(mass), sp.csr_array(stiffness), sp.csr_array(rows),
@@ -212,7 +215,7 @@ def _row(p: BeamParameters, left: Floats, n: int) -> Floats:
     return row
 
 
-def _tie(stiffness: sp.lil_array, one: int, other: int, value: float) -> None:
+def _tie(stiffness: Floats, one: int, other: int, value: float) -> None:
     """A spring between two dofs."""
     stiffness[one, one] += value
     stiffness[other, other] += value
