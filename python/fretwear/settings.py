@@ -14,12 +14,9 @@ from numpy.typing import ArrayLike
 
 __all__ = ["UNITS", "Base", "Body", "Bounds", "Campbell", "CaseGroup", "Contact", "Control",
            "Cyclic", "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode",
-           "Output", "Polynomial", "Population", "PseudoTime", "Resonance", "Sensitivity", "Solver",
-           "Spring", "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
-__all__ = ["UNITS", "Base", "Body", "Campbell", "CaseGroup", "Contact", "Control", "Cyclic",
-           "Damper", "Groups", "Harmonics", "Load", "Mission", "Mistuning", "Mode", "Output",
-           "Polynomial", "Population", "PseudoTime", "Resonance", "Ringdown", "Sensitivity",
-           "Solver", "Spring", "Stress", "Structure", "Sweep", "Time", "User", "Wear"]
+           "Output", "Polynomial", "Population", "PseudoTime", "Resonance", "Ringdown",
+           "Sensitivity", "Solver", "Spring", "Stress", "Structure", "Sweep", "Time", "User",
+           "Wear"]
 
 #: Units of the keys that have one: length L, mass M, time s and force F of the model,
 #: or `unit` where another key says it.
@@ -97,12 +94,9 @@ class CaseGroup(TypedDict, total=False):
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
     #: a sweep, one frequency, wear, integration in time, natural frequencies, a nonlinear mode, a
-    #: resonance, a Campbell diagram, many mistuned disks, or a range over (default: 'frf')
+    #: resonance, a Campbell diagram, many mistuned disks, a range over res (default: 'frf')
     analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
-                      "population", "bounds"]
-    #: resonance, a Campbell diagram, many mistuned disks, or free decay (default: 'frf')
-    analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
-                      "population", "ringdown"]
+                      "population", "bounds", "ringdown"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
@@ -829,12 +823,14 @@ class Bounds(TypedDict, total=False):
     #: residual tractions to start from: the centre, both ends of the gradient, and corners that are
     #: drawn (default: 4)
     n_starts: int
+
+
 class Ringdown(TypedDict, total=False):
     """Group &ringdown: free decay from the shape of a mode."""
 
     #: of the elastic modes of the structure with its closed pairs stuck (default: 1)
     number: int
-    #: [L] of the first observed quantity, from where the structure rests; only: analysis =
+    #: [L] of the first observed quantity, from where it rests without vibration; only: analysis =
     #: 'ringdown' (required)
     amplitude: float
     #: periods of the stuck mode that are followed (default: 20)
