@@ -18,6 +18,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from site_search import index_page, write_search
+
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGURATION = ROOT / "docs" / "api"
 
@@ -70,12 +72,17 @@ def build_site(target: Path) -> list[str]:
                             ignore=shutil.ignore_patterns("*.h5", "api", "site"))
         for name in ("conf.py", "contents.md"):
             shutil.copy(ROOT / "docs" / "site" / name, stage)
+        for name in ("static", "templates"):
+            shutil.copytree(ROOT / "docs" / "site" / name, stage / name)
+        (stage / "docs" / "index_of_words.md").write_text(index_page(ROOT / "docs"),
+                                                          encoding="utf-8")
         for page in stage.rglob("*.md"):
             page.write_text(_whole_links(page.read_text(encoding="utf-8"), page.parent),
                             encoding="utf-8")
         run(sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html",
             "-D", "root_doc=contents", "-d", stage / "_build", stage, target)
     shutil.copy(target / "README.html", target / "index.html")
+    write_search(target, (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8"))
     return []
 
 

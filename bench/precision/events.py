@@ -159,7 +159,8 @@ def draw(path: Path, limits: list[Limit], names: list[str]) -> None:
         for sampling, mark, colour in zip(SAMPLINGS, ("o-", "s-"), COLOURS):
             found = [limit for limit in limits if (limit.case, limit.sampling) == (name, sampling)
                      and not math.isnan(limit.seconds)]
-            axes.plot([limit.n_time for limit in found], [max(limit.error, EXACT) for limit in found],
+            axes.plot([limit.n_time for limit in found], [max(limit.error, EXACT)
+                                                          for limit in found],
                       mark, color=colour, markersize=4, linewidth=1.1, label=sampling)
         axes.set(xscale="log", yscale="log")
         axes.xaxis.set_minor_formatter(NullFormatter())

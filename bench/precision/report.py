@@ -204,11 +204,12 @@ def draw(path: Path, data: Precision, names: list[str]) -> None:
             found = [s for s in data.samples
                      if (s.case, s.setting) == (name, setting) and is_usable(s)]
             if found or len(names) > 1:
-                axes.plot([1e3 * s.seconds for s in found], [max(s.error, EXACT) for s in found], mark,
-                          color=colour, markersize=4, linewidth=1.1, label=setting)
+                axes.plot([1e3 * s.seconds for s in found],
+                          [max(s.error, EXACT) for s in found], mark, color=colour,
+                          markersize=4, linewidth=1.1, label=setting)
         kept = [k for k in data.kept if k.case == name and k.estimate <= k.accuracy]
-        axes.plot([1e3 * k.seconds for k in kept], [max(k.error, EXACT) for k in kept], "*", color="black",
-                  markersize=8, label="accuracy 1e-2, 1e-3, 1e-4")
+        axes.plot([1e3 * k.seconds for k in kept], [max(k.error, EXACT) for k in kept], "*",
+                  color="black", markersize=8, label="accuracy 1e-2, 1e-3, 1e-4")
         axes.set(xscale="log", yscale="log")
         if min((line.get_ydata().min() for line in axes.lines if len(line.get_ydata())),
                default=1.0) <= EXACT:

@@ -14,5 +14,9 @@ highlight_language = "none"
 html_theme = "alabaster"
 html_theme_options = {"description": "Vibration with contact, friction and fretting wear",
                       "page_width": "1180px", "sidebar_width": "260px", "fixed_sidebar": True}
-html_sidebars = {"**": ["about.html", "searchbox.html", "navigation.html", "localtoc.html"]}
+# A search and a menu of our own: excerpts without a server, and room on a narrow screen.
+templates_path = ["templates"]
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_sidebars = {"**": ["about.html", "searchbox.html", "menu.html", "localtoc.html"]}
 html_copy_source = False

@@ -26,6 +26,8 @@ __all__ = ["add_arguments", "main", "render_report", "render_study", "write_repo
 
 #: Rows of the table of points; of a longer result every k-th, the peak and failures are shown.
 _MOST_ROWS = 500
+#: Letters of a cell from which it is a sentence.
+_SENTENCE = 28
 
 _STYLE = """
 :root { color: #1c2733; background: #fff; font: 16px/1.5 system-ui, sans-serif; }
@@ -37,9 +39,11 @@ p.warning { background: #fdecea; border-left: 4px solid #c0392b; padding: .5rem 
 nav a { margin-right: 1rem; color: #1f4e79; white-space: nowrap; }
 figure { margin: 1rem 0; }
 figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
-.scroll { overflow: auto; max-height: 32rem; }
+.scroll { overflow: auto; max-height: 32rem; max-width: 100%; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
 th, td { padding: .2rem .8rem .2rem 0; text-align: left; border-bottom: 1px solid #dde3e9; }
+td, th { min-width: 3.5rem; overflow-wrap: normal; }
+td.words { min-width: 10rem; max-width: 44rem; }
 td.number, th.number { text-align: right; white-space: nowrap; }
 thead th { position: sticky; top: 0; background: #fff; }
 tr.failed td { color: #c0392b; }
@@ -208,7 +212,10 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]],
             return f'<td class="number">{value:.6g}</td>'
         if isinstance(value, (int, np.integer)):
             return f'<td class="number">{value}</td>'
-        return f"<td>{escape(str(value))}</td>"
+        text = str(value)
+        # A sentence keeps the width of a line; beside it the table scrolls.
+        wide = ' class="words"' if len(text) > _SENTENCE else ""
+        return f"<td{wide}>{escape(text)}</td>"
 
     lines = []
     for k, row in enumerate(rows):

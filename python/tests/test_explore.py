@@ -15,7 +15,7 @@ from browsing import headless_browser, wait_for
 
 import fretwear as fw
 from fretwear.errors import InputError
-from fretwear.explore.sliders import read_slider, settings_of, usual_sliders
+from fretwear.explore.sliders import read_slider, settings_of, unit_of, usual_sliders
 from fretwear.explore.solver import Answer, Solver
 
 __all__ = ["headless_browser"]  # a fixture
@@ -54,6 +54,14 @@ def test_slider_of_the_command_line(case: fw.Case) -> None:
     whole = read_slider("harmonics%n_harmonics=1:9", case)
     assert settings_of([slider, whole], [0.30000000000000004, 5.0]) == {
         "contact": {"mu": 0.3}, "harmonics": {"n_harmonics": 5}}
+    # A hundredth of the range for each press of a key, of values typed without a point too.
+    wide = read_slider("harmonics%n_time=16:6400", case.replace(harmonics={"n_time": 512}))
+    assert wide.is_whole and 60 <= wide.step <= 68
+    assert (wide.value - wide.low) % wide.step == 0 and wide.low >= 16 and wide.high <= 6400
+    assert unit_of("contact%normal_load", "mm", "N") == "N"
+    assert unit_of("contact%tangential_stiffness", "mm", "N") == "N/mm"
+    assert unit_of("model%rotation_speed", "", "") == "rad/s"
+    assert unit_of("contact%mu", "mm", "N") == unit_of("contact%gap", "", "") == ""
     for wrong, word in (("contact%mu", "low:high"), ("contact%mu=1:0", "lower one first"),
                         ("model%source=0:1", "one number"),
                         ("contact%mu=0.6:0.9", "mu is 0.5 in the case"),

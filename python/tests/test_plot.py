@@ -408,7 +408,8 @@ def test_the_table_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                  "load%harmonic_scale": np.linspace(2.0, 1.0, 24),
                  "max_amplitude[tip]": many}, tmp_path / "sample.h5", "study")
     sample, bar = plot_table("sample.h5", ["max_amplitude[tip]"]).axes
-    assert bar.get_ylabel() == "load%harmonic_scale" and len(sample.collections[0].get_array()) == 24
+    assert bar.get_ylabel() == "load%harmonic_scale"
+    assert len(sample.collections[0].get_array()) == 24
     assert main(["plot", "study.h5"]) == 0
     assert Path("study.png").read_bytes().startswith(b"\x89PNG")
     assert main(["plot", "study.h5", "--kind", "response"]) == 3

@@ -30,7 +30,7 @@ from .figures import (
     places_of_pairs,
     response_figure,
 )
-from .sliders import Slider, settings_of
+from .sliders import Slider, settings_of, unit_of
 from .solver import Answer, Solver
 
 __all__ = ["Page"]
@@ -160,6 +160,7 @@ class Page:
             self._observed.options = choices(result.observed)
             self._observed.value = result.observed[0]
             self._observed.visible = len(result.observed) > 1
+            self._say_units(result)
         self._draw_curve()
         if not self._first.data["x"] and answer.is_final:
             self._first.data = dict(self._curve.data)
@@ -172,6 +173,12 @@ class Page:
             text += " (few points; more follow)"
         self._say(f"{text}; {answer.seconds:.2f} s" + (f". {answer.words}" if answer.words else ""))
 
+    def _say_units(self, result: Result) -> None:
+        """Titles of the sliders with the units of the model, which the first answer knows."""
+        length, force = units_of(result, "amplitude"), units_of(result, "contact/force")
+        for handle, slider in zip(self._handles, self._sliders):
+            handle.title = label(slider.title, unit_of(slider.key, length, force))
+
     def _say(self, words: str, colour: str = "#1c2733") -> None:
         self._words.text = (f"<p role='status' aria-live='polite' style='color:{colour}'>"
                             f"{escape(words)}</p>")
@@ -182,6 +189,10 @@ class Page:
             return
         self._point = int(np.argmin(np.abs(self._result.frequency - event.x)))
         self._draw_point()
+        self._say(f"point {self._point + 1}: {self._amplitude()[self._point]:.4g} "
+                  f"{units_of(self._result, 'amplitude')} at "
+                  f"{self._result.frequency[self._point]:.6g} Hz"
+                  + ("" if self._result.converged[self._point] else ", not converged"))
 
     # ------------------------------------------------------------------ drawing
 

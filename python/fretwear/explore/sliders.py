@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +12,9 @@ import numpy as np
 from .._native import namelist_values
 from ..case import Case
 from ..errors import InputError
+from ..settings import UNITS
 
-__all__ = ["Slider", "read_slider", "settings_of", "usual_sliders"]
+__all__ = ["Slider", "read_slider", "settings_of", "unit_of", "usual_sliders"]
 
 #: Keys that get a slider unasked where the case has them, and what the page calls them.
 _USUAL = {
@@ -20,7 +22,7 @@ _USUAL = {
     "contact%mu": "friction coefficient",
     "contact%normal_load": "normal load",
     "contact%gap": "gap",
-    "model%rotation_speed": "rotation speed [rad/s]",
+    "model%rotation_speed": "rotation speed",
     "harmonics%n_harmonics": "harmonics",
 }
 #: Keys whose values may stand in the model file, by their names as parts of a case.
@@ -109,7 +111,7 @@ def read_slider(text: str, case: Case) -> Slider:
                          "starts; the range must enclose it")
     title = _USUAL.get(key, key)
     if _is_whole(values[key][0]) and low == int(low) and high == int(high):
-        return Slider(key, title, low, high, 1, value, True)
+        return _whole(key, title, int(low), int(high), int(value))
     return _even(key, title, low, high, value)
 
 
@@ -151,6 +153,24 @@ def _single(values: dict[str, list[str]], key: str) -> float | None:
 
 def _is_whole(text: str) -> bool:
     return text.lstrip("+-").isdigit()
+
+
+def unit_of(key: str, length: str, force: str) -> str:
+    """Unit of a key in those of a model; "" where it has none, or where the model names none."""
+    letters = UNITS.get(key, "")
+    known = {"L": length, "F": force, "rad": "rad", "s": "s", "degrees": "degrees"}
+    parts = re.split(r"([ /^0-9]+)", letters)
+    names = [part for part in parts if re.match(r"[A-Za-z]", part)]
+    if not letters or not all(known.get(name) for name in names):
+        return ""
+    return "".join(known.get(part, part) for part in parts)
+
+
+def _whole(key: str, title: str, low: int, high: int, value: int) -> Slider:
+    """Whole numbers in about a hundred steps, on which the value of the case lies."""
+    step = max(1, round((high - low) / 100))
+    return Slider(key, title, value - step * ((value - low) // step),
+                  value + step * ((high - value) // step), step, value, True)
 
 
 def _even(key: str, title: str, low: float, high: float, value: float) -> Slider:

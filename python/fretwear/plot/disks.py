@@ -227,7 +227,8 @@ def _frame(axes: Axes, result: Result) -> None:
         handles += [Line2D([], [], color="0.25", marker="s", markersize=4.0, linewidth=1.0,
                            label="engine orders"),
                     Line2D([], [], color="0.25", marker="o", markersize=10, linestyle="none",
-                           markerfacecolor="none", label=f"within {100 * _NEAR:g} % of\na frequency")]
+                           markerfacecolor="none",
+                           label=f"within {100 * _NEAR:g} % of\na frequency")]
     axes.legend(handles=handles, frameon=False, fontsize=8, loc="center left",
                 bbox_to_anchor=(1.0, 0.5))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

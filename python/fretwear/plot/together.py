@@ -110,7 +110,8 @@ def told_apart(results: Sequence[Result]) -> list[str]:
     except (AbsentError, NotBuiltError):
         return names
     keys = [key for key in dict.fromkeys(key for case in cases for key in case)
-            if not key.startswith("output%") and len({tuple(case.get(key, ())) for case in cases}) > 1]
+            if not key.startswith("output%")
+            and len({tuple(case.get(key, ())) for case in cases}) > 1]
     if len(keys) != 1 or not all(len(case.get(keys[0], ())) == 1 for case in cases):
         return names
     return [f"{keys[0]} = {_number(case[keys[0]][0])}" for case in cases]

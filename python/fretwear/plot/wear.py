@@ -162,7 +162,8 @@ def plot_wear_evolution(source: Source) -> Figure:
         # The rate falls over decades of cycles; the start, at zero, stays in the picture.
         first = 10.0 ** np.ceil(np.log10(positive[0]))
         panels[-1].set_xscale("symlog", linthresh=first, linscale=0.5)
-        panels[-1].set_xticks([0.0, *10.0 ** np.arange(np.log10(first), np.log10(cycles[-1]) + 1e-9)])
+        decades = np.arange(np.log10(first), np.log10(cycles[-1]) + 1e-9)
+        panels[-1].set_xticks([0.0, *10.0 ** decades])
         panels[-1].set_xlim(-0.02 * first, 1.3 * cycles[-1])
         abscissa = ""
     else:
