@@ -225,6 +225,19 @@ def test_the_same_nodes_held_by_name(tmp_path: Path) -> None:
         assert one[name] == pytest.approx(other[name], abs=SAME * np.abs(other[name]).max())
 
 
+def test_loads_of_a_deck_belong_to_its_job(tmp_path: Path,
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    """A deck that only gives the mesh gives no loads: those are of the command line."""
+    shutil.copy(WHEEL, tmp_path / "mesh.inp")
+    for suffix in (".sti", ".mas", ".dof"):
+        shutil.copy(WHEEL.with_suffix(suffix), tmp_path)
+    assert run_import("--stiffness", tmp_path / "wheel.sti", "--mass", tmp_path / "wheel.mas",
+                      "--mesh", tmp_path / "mesh.inp", "--observe", "tip=TIP:3", "-o",
+                      tmp_path / "wheel.h5") == 0
+    assert "loads: none" in capsys.readouterr().err
+    assert not any(name.startswith("load/") for name in datasets(tmp_path / "wheel.h5"))
+
+
 def test_sets_name_pairs_and_loads(tmp_path: Path) -> None:
     """A line of the table for the rim, one pair for each of its nodes, as by their numbers."""
     (tmp_path / "sets.csv").write_text(

@@ -290,9 +290,8 @@ def _with_mesh(model: FullModel, options: argparse.Namespace,
         deck = read_deck(job.deck)
     if options.mesh is not None:
         mesh = read_mesh_file(options.mesh)
-    elif deck is not None and any(len(cells) for _, cells in deck.blocks):
+    elif deck is not None and any(cells.shape[1] for _, cells in deck.blocks):
         mesh = mesh_of_deck(deck)
-    deck = deck or (None if mesh is None else mesh.deck)
     sets = {**({} if deck is None else deck.node_sets), **({} if mesh is None else mesh.sets)}
     notes = list(model.notes) + ([] if deck is None else list(deck.notes))
     held: set[tuple[int, int]] = set()
