@@ -332,6 +332,13 @@ def test_sets_that_leave_nodes_out_are_told(tmp_path: Path,
     assert "2 nodes outside of LEFT lie on others when they are turned" in capsys.readouterr().out
 
 
+def test_loads_on_both_faces_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All around the rim: once by each of two sectors. At the tip alone: once."""
+    for load, told in (("RIM:3=1", True), ("TIP:3=1", False)):
+        assert run_import(WHEEL, "--sectors", 8, "--load", load, "--check") == 0
+        assert ("the loads of two sectors add up" in capsys.readouterr().out) == told
+
+
 def test_decks(tmp_path: Path) -> None:
     """Includes, ranges, sets of sets, surfaces of element faces, lines that go on."""
     (tmp_path / "nodes.inc").write_text("** nodes\n*Node, nset=All\n" + "".join(

@@ -380,6 +380,7 @@ def _sector(model: FullModel, options: argparse.Namespace, from_calculix: bool) 
     if frames == "cartesian":
         model = in_sector_frames(model, interfaces)
         model = replace(model, notes=[*model.notes, *_turned(model, interfaces)])
+    model = replace(model, notes=[*model.notes, *_twice(model, interfaces)])
     return replace(model, interfaces=interfaces, axis=options.axis,
                    in_cylinder=None if frames == "cartesian" else axis_of(options.axis))
 
@@ -401,6 +402,22 @@ def _turned(model: FullModel, interfaces: Interfaces) -> list[Finding]:
             found.append(Finding("warning", where, f"node {node} is on the right face, where "
                                  "components are along the axes of the next sector; node "
                                  f"{partner[node]} of the left face has those of this one"))
+    return found
+
+
+def _twice(model: FullModel, interfaces: Interfaces) -> list[Finding]:
+    """Loads on both faces: a node of both has the sum of what two sectors put there."""
+    place: dict[int, list[int]] = {}
+    for k, (node, _) in enumerate(model.dofs.labels or ()):
+        place.setdefault(node, []).append(k)
+    found = []
+    for name, load in model.loads.items():
+        both = [one for one, other in zip(interfaces.left_nodes, interfaces.right_nodes)
+                if load[place.get(one, [])].any() and load[place.get(other, [])].any()]
+        if both:
+            found.append(Finding("warning", f"load {name}", f"{len(both)} nodes of the left face "
+                                 f"and their partners on the right one are loaded, node {both[0]} "
+                                 "for one: at such a node the loads of two sectors add up"))
     return found
 
 
