@@ -225,6 +225,19 @@ def test_the_same_nodes_held_by_name(tmp_path: Path) -> None:
         assert one[name] == pytest.approx(other[name], abs=SAME * np.abs(other[name]).max())
 
 
+def test_loads_of_a_deck_belong_to_its_job(tmp_path: Path,
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    """A deck that only gives the mesh gives no loads: those are of the command line."""
+    shutil.copy(WHEEL, tmp_path / "mesh.inp")
+    for suffix in (".sti", ".mas", ".dof"):
+        shutil.copy(WHEEL.with_suffix(suffix), tmp_path)
+    assert run_import("--stiffness", tmp_path / "wheel.sti", "--mass", tmp_path / "wheel.mas",
+                      "--mesh", tmp_path / "mesh.inp", "--observe", "tip=TIP:3", "-o",
+                      tmp_path / "wheel.h5") == 0
+    assert "loads: none" in capsys.readouterr().err
+    assert not any(name.startswith("load/") for name in datasets(tmp_path / "wheel.h5"))
+
+
 def test_sets_name_pairs_and_loads(tmp_path: Path) -> None:
     """A line of the table for the rim, one pair for each of its nodes, as by their numbers."""
     (tmp_path / "sets.csv").write_text(
@@ -317,6 +330,13 @@ def test_sets_that_leave_nodes_out_are_told(tmp_path: Path,
     assert run_import(tmp_path / "wheel.inp", "--sectors", 8, "--left", "LEFT", "--right", "RIGHT",
                       "--check") == 0
     assert "2 nodes outside of LEFT lie on others when they are turned" in capsys.readouterr().out
+
+
+def test_loads_on_both_faces_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All around the rim: once by each of two sectors. At the tip alone: once."""
+    for load, told in (("RIM:3=1", True), ("TIP:3=1", False)):
+        assert run_import(WHEEL, "--sectors", 8, "--load", load, "--check") == 0
+        assert ("the loads of two sectors add up" in capsys.readouterr().out) == told
 
 
 def test_decks(tmp_path: Path) -> None:

@@ -290,9 +290,8 @@ def _with_mesh(model: FullModel, options: argparse.Namespace,
         deck = read_deck(job.deck)
     if options.mesh is not None:
         mesh = read_mesh_file(options.mesh)
-    elif deck is not None and any(len(cells) for _, cells in deck.blocks):
+    elif deck is not None and any(cells.shape[1] for _, cells in deck.blocks):
         mesh = mesh_of_deck(deck)
-    deck = deck or (None if mesh is None else mesh.deck)
     sets = {**({} if deck is None else deck.node_sets), **({} if mesh is None else mesh.sets)}
     notes = list(model.notes) + ([] if deck is None else list(deck.notes))
     held: set[tuple[int, int]] = set()
@@ -381,6 +380,7 @@ def _sector(model: FullModel, options: argparse.Namespace, from_calculix: bool) 
     if frames == "cartesian":
         model = in_sector_frames(model, interfaces)
         model = replace(model, notes=[*model.notes, *_turned(model, interfaces)])
+    model = replace(model, notes=[*model.notes, *_twice(model, interfaces)])
     return replace(model, interfaces=interfaces, axis=options.axis,
                    in_cylinder=None if frames == "cartesian" else axis_of(options.axis))
 
@@ -402,6 +402,22 @@ def _turned(model: FullModel, interfaces: Interfaces) -> list[Finding]:
             found.append(Finding("warning", where, f"node {node} is on the right face, where "
                                  "components are along the axes of the next sector; node "
                                  f"{partner[node]} of the left face has those of this one"))
+    return found
+
+
+def _twice(model: FullModel, interfaces: Interfaces) -> list[Finding]:
+    """Loads on both faces: a node of both has the sum of what two sectors put there."""
+    place: dict[int, list[int]] = {}
+    for k, (node, _) in enumerate(model.dofs.labels or ()):
+        place.setdefault(node, []).append(k)
+    found = []
+    for name, load in model.loads.items():
+        both = [one for one, other in zip(interfaces.left_nodes, interfaces.right_nodes)
+                if load[place.get(one, [])].any() and load[place.get(other, [])].any()]
+        if both:
+            found.append(Finding("warning", f"load {name}", f"{len(both)} nodes of the left face "
+                                 f"and their partners on the right one are loaded, node {both[0]} "
+                                 "for one: at such a node the loads of two sectors add up"))
     return found
 
 

@@ -26,10 +26,14 @@ Ints = NDArray[np.int64]
 
 #: Turned nodes lie on each other within this share of the distance between neighbours.
 _MATCH = 1e-3
+#: Positions of six digits are this share of the largest from the true ones.
+_DIGITS = 2e-6
 #: Neighbours nearer than this share of the usual distance are two nodes at one place.
 _ONE_PLACE = 1e-3
 #: A turned node lies in a face, between its nodes, within this share of its edge.
 _IN_FACE = 1e-2
+#: Cosine of the angle between faces at an edge that face each other, below 25 degrees.
+_FACING = 0.9
 #: Nodes that a message names.
 _NAMED = 5
 
@@ -148,6 +152,7 @@ def faces_by_turning(mesh: ImportedMesh, n_sectors: int, axis: str,
                          "on both cut faces, or parts touch there; name the cut faces (--left, "
                          "--right)")
     right = [tuple(partner[k] for k in face) for face in left]
+    _refuse_cracks(mesh, surface, left, partner, turn, by)
     parts = _parts(left)
     text = (f"cut faces found by turning: {len(left)} faces of cells on each, in {len(parts)} "
             + ("part" if len(parts) == 1 else "parts"))
@@ -169,7 +174,7 @@ def left_behind(mesh: ImportedMesh, left: Face, turn: Floats,
     outside = corners[~np.isin(mesh.nodes[corners], [*left.nodes, *leave])]
     if not len(outside):
         return None
-    tolerance = _MATCH * _spacing(mesh.points[corners])
+    tolerance = _tolerance(mesh.points[corners])
     distance, _ = cKDTree(mesh.points[corners]).query(mesh.points[outside] @ turn.T)
     touching = outside[distance <= tolerance]
     if not len(touching):
@@ -241,7 +246,7 @@ def _apart(left: Face, right: Face, axis: str) -> str:
 
 def _nearest(left: Face, right: Face, turn: Floats,
              mesh: ImportedMesh | None) -> tuple[Ints, Floats, float]:
-    tolerance = _MATCH * _spacing(left.places)
+    tolerance = _tolerance(left.places)
     turned = left.places @ turn.T
     tree = cKDTree(right.places)
     distance, partner = tree.query(turned)
@@ -254,6 +259,11 @@ def _nearest(left: Face, right: Face, turn: Floats,
                 partner[k] = same[0]
                 distance[k] = np.linalg.norm(turned[k] - right.places[same[0]])
     return partner, distance, tolerance
+
+
+def _tolerance(places: Floats) -> float:
+    """How far from each other nodes are one, after turning."""
+    return max(_MATCH * _spacing(places), _DIGITS * float(np.abs(places).max()))
 
 
 def _spacing(places: Floats) -> float:
@@ -271,7 +281,7 @@ def _partners(mesh: ImportedMesh, surface: list[tuple[int, ...]], turn: Floats,
     """Corner of the surface (point of the mesh) that each lies on when it is turned."""
     corners = np.unique([k for face in surface for k in face])
     places = mesh.points[corners]
-    tolerance = _MATCH * _spacing(places)
+    tolerance = _tolerance(places)
     body = _body_of_nodes(mesh)
     partner = {}
     for own, near in zip(corners.tolist(),
@@ -312,6 +322,45 @@ def _refuse_other_meshes(mesh: ImportedMesh, surface: list[tuple[int, ...]],
                                      "lies in a face of the surface, between its nodes: the mesh "
                                      "is not the same on both cut faces, or parts touch there; "
                                      "name the cut faces (--left, --right)")
+
+
+def _refuse_cracks(mesh: ImportedMesh, surface: list[tuple[int, ...]],
+                   left: list[tuple[int, ...]], partner: dict[int, int], turn: Floats,
+                   by: str) -> None:
+    """Faces of the surface beside matched ones, which face each other where those end: behind the
+    edge of a whole cut face the surface goes on from a sector to the next."""
+    beside: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
+    for face in surface:
+        for edge in _edges(face):
+            beside.setdefault(edge, []).append(face)
+    one = {tuple(sorted(face)) for face in left}
+    two = {tuple(sorted(partner[k] for k in face)) for face in left}
+    for face in left:
+        for edge in _edges(face):
+            across = tuple(sorted(partner[k] for k in edge))
+            own = [other for other in beside[edge] if tuple(sorted(other)) not in one]
+            next_ = [other for other in beside.get(across, ())
+                     if tuple(sorted(other)) not in two]
+            if any(turn @ _away(mesh, a, edge) @ _away(mesh, b, across) > _FACING
+                   for a in own for b in next_):
+                raise InputError(f"{mesh.path}: at node {_of_mesh(mesh, edge[0])} the faces that "
+                                 f"lie on others, {by}, end where the surfaces still face each "
+                                 "other: the mesh is not the same on both cut faces, or parts "
+                                 "touch there; name the cut faces (--left, --right)")
+
+
+def _edges(face: tuple[int, ...]) -> list[tuple[int, ...]]:
+    return [tuple(sorted((face[k - 1], face[k]))) for k in range(len(face))]
+
+
+def _away(mesh: ImportedMesh, face: tuple[int, ...], edge: tuple[int, ...]) -> Floats:
+    """Unit vector within a face, away from an edge of it and square to that."""
+    one, two = mesh.points[list(edge)]
+    along = (two - one) / np.linalg.norm(two - one)
+    off = mesh.points[list(face)].mean(axis=0) - one
+    off = off - (off @ along) * along
+    size = float(np.linalg.norm(off))
+    return np.asarray(off / size if size > 0.0 else off)
 
 
 def _distance(place: Floats, corner: Floats) -> float:

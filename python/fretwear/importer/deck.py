@@ -87,8 +87,8 @@ class Deck:
     nodes, points : (n,) int, (n, 3)
         Numbers and positions, in the order of the deck.
     blocks : list of (str, (n_cells, n_corners) int)
-        Cells of solids and surfaces as meshio calls them, by places in `nodes`; other elements
-        under their own names, empty.
+        Cells of solids and surfaces as meshio calls them, by places in `nodes`, a block for each
+        keyword; other elements under their own names, without nodes.
     elements : dict of int to (str, list of int)
         Type and node numbers of each element.
     node_sets, element_sets : dict of str to list of int
@@ -186,25 +186,19 @@ class _Reader:
         self.place = dict(zip(self.found.nodes.tolist(), self.found.points))
 
     def _elements(self) -> None:
-        cells: dict[str, list[list[int]]] = {}
+        index = {node: k for k, node in enumerate(self.found.nodes.tolist())}
         for card in self._of("ELEMENT"):
             kind, n = _cell(card.name("TYPE"))
-            read: list[int] = []
-            for numbers in _joined(card, n):
-                self.found.elements[numbers[0]] = kind, numbers[1:]
-                read.append(numbers[0])
-                cells.setdefault(kind, [])
-                if n:
-                    cells[kind].append(numbers[1:])
-            self._into(self.found.element_sets, card.name("ELSET"), read)
-        index = {node: k for k, node in enumerate(self.found.nodes.tolist())}
-        for kind, rows in cells.items():
+            read = list(_joined(card, n))
+            self.found.elements.update((numbers[0], (kind, numbers[1:])) for numbers in read)
+            self._into(self.found.element_sets, card.name("ELSET"), [row[0] for row in read])
             try:
-                self.found.blocks.append((kind, np.array([[index[node] for node in row]
-                                                          for row in rows], dtype=np.int64)))
+                rows = [[index[node] for node in numbers[1:1 + n]] for numbers in read]
             except KeyError as error:
-                raise InputError(f"{self.found.path}: a cell of type {kind} names node {error}, "
-                                 "which the deck does not list") from None
+                raise InputError(f"{card.where}: a cell of type {kind} names node {error}, which "
+                                 "the deck does not list") from None
+            self.found.blocks.append((kind, np.array(rows, dtype=np.int64).reshape(-1, n)
+                                      if n else np.zeros((len(read), 0), dtype=np.int64)))
 
     def _set(self, card: _Card) -> None:
         """*NSET or *ELSET: numbers, ranges, other sets."""

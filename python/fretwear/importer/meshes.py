@@ -60,8 +60,6 @@ class ImportedMesh:
         Numbers of both corners of each edge and of the node in its middle.
     sets : dict of str to list of int
         Numbers of nodes by the name of their set, in capital letters.
-    deck : Deck or None
-        All that is read of a deck.
     """
 
     path: Path
@@ -75,7 +73,6 @@ class ImportedMesh:
     all_nodes: Ints
     middles: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
     sets: dict[str, list[int]] = field(default_factory=dict)
-    deck: Deck | None = None
 
 
 def read_mesh_file(path: str | Path) -> ImportedMesh:
@@ -102,8 +99,7 @@ def read_mesh_file(path: str | Path) -> ImportedMesh:
 
 def mesh_of_deck(deck: Deck) -> ImportedMesh:
     """The mesh of a deck, with its sets of nodes."""
-    return replace(_linear(deck.path, deck.points, deck.nodes, deck.blocks), deck=deck,
-                   sets=deck.node_sets)
+    return replace(_linear(deck.path, deck.points, deck.nodes, deck.blocks), sets=deck.node_sets)
 
 
 def _is_ansys(path: Path) -> bool:
