@@ -296,7 +296,7 @@ contains
       character(:), allocatable :: message
       integer :: n_failed
 
-      associate (n => self%n_done, group => self%group)
+      associate (n => self%n_done, group => self%group, unused => case)
          call self%solver%strategy%describe(self%solver%one, run%state, run%summary, message)
          if (len(message) > 0) call run%observer%on_message(message)
          group%range = group%range(:, :n)
