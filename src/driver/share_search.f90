@@ -69,6 +69,8 @@ module fw_share_search
    !> Starts that each search has, and responses for each pair that four starts may take, with
    !> enough for the line searches of few pairs.
    integer, parameter :: usual_starts = 4, most_for_pair = 15, fewest = 30
+   !> Pairs up to which all corners are looked at, and responses for each of them beside.
+   integer, parameter :: few_pairs = 6, beside_corners = 10
 
 contains
 
@@ -86,7 +88,11 @@ contains
       self%known(1) = centre
       call drop_round_off(self%known(1))
       self%n_known = 1
-      self%most = max(fewest, most_for_pair*size(centre%t))*n_starts/usual_starts
+      associate (n => size(centre%t))
+         self%most = max(fewest, most_for_pair*n)
+         if (n <= few_pairs) self%most = max(self%most, 2**n + beside_corners*n)
+      end associate
+      self%most = self%most*n_starts/usual_starts
       ! The same draws at each frequency: no row depends on those before.
       state = 1
       do start = 1, n_starts
@@ -111,8 +117,8 @@ contains
    end subroutine drop_round_off
 
    !> Places where the descents to the lowest and to the highest value of a start begin; 0 where
-   !> there is none. Of what is drawn they are the lowest and the highest: where all pairs stick,
-   !> the vibration depends on no share, and many draws say nothing.
+   !> there is none. Of what is drawn, inside and at corners, they are the lowest and the highest:
+   !> where all pairs stick, the vibration depends on no share, and many draws say nothing.
    subroutine begin_at(self, solver, number, state, from, error)
       class(share_search), intent(inout) :: self
       class(share_solver), intent(inout) :: solver
@@ -122,7 +128,8 @@ contains
       integer, intent(out) :: from(2)
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: t(size(self%known(1)%t))
-      integer :: at, i, k
+      integer :: at, i, k, n_corners, n_inside
+      logical :: all_corners
 
       from = 1
       if (number == 1) return
@@ -137,10 +144,18 @@ contains
          return
       end if
       from = 0
-      do k = 1, size(t) + 2
+      n_inside = size(t) + 2
+      ! All corners of few pairs: tractions that oppose each other leave most of the middle behind.
+      all_corners = size(t) <= few_pairs
+      n_corners = 4*size(t)
+      if (all_corners) n_corners = 2**size(t)
+      do k = 1, n_inside + n_corners
          do i = 1, size(t)
             state = next_number(state)
             t(i) = 2.0_wp*real(state, wp)/real(huge(1), wp) - 1.0_wp
+            if (k <= n_inside) cycle
+            t(i) = sign(1.0_wp, t(i))
+            if (all_corners) t(i) = merge(1.0_wp, -1.0_wp, btest(k - n_inside, i - 1))
          end do
          call self%go_to(solver, 1, t, at, error)
          if (allocated(error)) return
