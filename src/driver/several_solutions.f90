@@ -58,12 +58,12 @@ module fw_several_solutions
 
    !> Rounds over all starts without a new solution that end a search.
    integer, parameter :: most_rounds = 3
-   !> Starts for each known solution in a round: one a little beside it, then some far away in the
-   !> directions that it yields to, and the rest anywhere.
-   integer, parameter :: starts_each = 10, starts_soft = 4
-   !> How far the first of them is, over the largest value that each unknown has in any solution, in
-   !> each of the rounds; and the part of the scale for unknowns that no solution has any of.
-   real(wp), parameter :: beside(most_rounds) = [0.02_wp, 0.3_wp, 1.2_wp], least_share = 1.0e-3_wp
+   !> Starts beside each known solution: how far they are, over the largest value that each unknown
+   !> has in any solution; and the part of the scale for unknowns that no solution has any of.
+   real(wp), parameter :: beside(*) = [0.02_wp, 0.3_wp, 1.2_wp], least_share = 1.0e-3_wp
+   !> All starts for each known solution in a round: those beside it, some far away in directions
+   !> that it yields to, and the rest anywhere.
+   integer, parameter :: starts_each = 12, starts_soft = 4
    !> How far the others are, over the largest solution: powers of ten between these. Jumps of
    !> resonances go that far.
    real(wp), parameter :: nearest = -1.0_wp, farthest = 1.6_wp
@@ -182,7 +182,7 @@ contains
          start = 1
          ! Those found on the way are starts of the same round.
          do while (start <= size(usual_guesses) + starts_each*search%newton%n_known)
-            call make_start(self, search, start, round, is_there)
+            call make_start(self, search, start, round == 1, is_there)
             at_end = .false.
             if (is_there) call try(self, case, request, search, at_end, error)
             if (allocated(error) .or. at_end) return
@@ -194,18 +194,21 @@ contains
 
    !> A start of a round: a usual guess, which another round would only repeat; beside a known
    !> solution; or from it in a direction that it yields to.
-   subroutine make_start(self, search, start, round, is_there)
+   subroutine make_start(self, search, start, is_first, is_there)
       type(several_source), intent(inout) :: self
       type(search_type), intent(inout), target :: search
-      integer, intent(in) :: start, round
+      integer, intent(in) :: start
+      !> Of the rounds without a new solution.
+      logical, intent(in) :: is_first
       logical, intent(out) :: is_there
       type(error_type), allocatable :: unused
       real(wp) :: width(size(search%x)), drawn(size(search%x)), length, largest
-      integer :: k
+      integer :: k, kind
 
       k = start - size(usual_guesses)
+      search%newton%repels = .true.
       if (k <= 0) then
-         is_there = round == 1
+         is_there = is_first
          if (.not. is_there) return
          associate (method => self%strategy%level%solver%method, &
                     walk => self%strategy%level%solver%walk)
@@ -220,13 +223,16 @@ contains
       call draw(search%seed, drawn)
       associate (known => search%newton%known(:, :search%newton%n_known), &
                  of => (k - 1)/starts_each + 1)
-         if (modulo(k - 1, starts_each) == 0) then
+         kind = modulo(k - 1, starts_each) + 1
+         if (kind <= size(beside)) then
             ! Each unknown by what the solutions have of it: higher harmonics are small in all.
             width = max(maxval(abs(known), dim=2), least_share*maxval(abs(known)))
-            search%unknowns = known(:, of) + beside(round)*width*drawn
+            search%unknowns = known(:, of) + beside(kind)*width*drawn
             return
-         else if (modulo(k - 1, starts_each) > starts_soft) then
+         else if (kind > size(beside) + starts_soft) then
             call draw(search%seed, width(:1))
+            ! What repels bends the way to all others as well: every second start goes without.
+            search%newton%repels = modulo(k, 2) == 0
             call draw_anywhere(self%strategy%level%system, abs(width(1))*widest, drawn, search)
             return
          end if

@@ -25,6 +25,8 @@ module fw_deflation
       type(solver_options) :: options
       !> Solutions that repel (n, 1:n_known), and the distance that counts as 1.
       integer :: n_known = 0
+      !> Whether they do at present: without them it is Newton's method as ever.
+      logical :: repels = .true.
       real(wp) :: scale = 1.0_wp
       real(wp), allocatable :: known(:, :)
       !> Residual, step, and point that is tried (n).
@@ -41,7 +43,7 @@ module fw_deflation
 
    !> Shortest fraction of a step that is tried: 1/256. Beside a known solution the factor is steep,
    !> and steps that fit it are short.
-   integer, parameter :: max_halvings = 8
+   integer, parameter :: max_halvings = 8, usual_halvings = 4
    !> Steps without a new smallest M |R| after which the path counts as cycling.
    integer, parameter :: patience = 10
    !> The factor of a step, where 1 - grad M . d/M is all but 0: far steps are cut by the line
@@ -146,7 +148,7 @@ contains
       fraction = 1.0_wp
       best = huge(1.0_wp)
       best_fraction = 1.0_wp
-      do halving = 0, max_halvings
+      do halving = 0, merge(max_halvings, usual_halvings, self%repels)
          self%trial = x + fraction*self%step
          call system%residual(self%trial, self%r)
          norm = norm_of(self%r)/system%reference
@@ -163,7 +165,8 @@ contains
       done = best < huge(1.0_wp)
       if (.not. done) return
       ! The system was left at a worse trial: back to the best.
-      if (fraction < best_fraction .or. halving > max_halvings) then
+      if (fraction < best_fraction .or. halving > merge(max_halvings, usual_halvings, &
+                                                        self%repels)) then
          self%trial = x + best_fraction*self%step
          call system%residual(self%trial, self%r)
          norm = norm_of(self%r)/system%reference
@@ -223,6 +226,7 @@ contains
       integer :: k
 
       logarithm = 0.0_wp
+      if (.not. self%repels) return
       do k = 1, self%n_known
          associate (distance => max(norm2(x - self%known(:, k))/self%scale, tiny(1.0_wp)))
             ! 1/d^p + shift, without an overflow of the power near a known solution.
@@ -241,6 +245,7 @@ contains
       integer :: k
 
       slope = 0.0_wp
+      if (.not. self%repels) return
       associate (p => self%options%deflation_power, shift => self%options%deflation_shift)
          do k = 1, self%n_known
             square = max(sum((x - self%known(:, k))**2), tiny(1.0_wp))
