@@ -7,7 +7,7 @@ module fw_read_obstacle
    use fw_gap_terms, only: gap_terms
    use fw_key, only: key
    use fw_kinds, only: wp
-   use fw_laws, only: is_of_high_order, is_viscous, law_words
+   use fw_laws, only: is_of_high_order, law_words
    use fw_raw_model, only: raw_model
    use fw_reader, only: reader_type
    use fw_text, only: to_text
@@ -167,29 +167,29 @@ contains
       speed = contact%speeds()
       call check_laws(reader, contact, speed)
       if (reader%failed()) return
-      if (contact%sliding == sliding_path) then
-         do i = 1, contact%n_pairs
-            ! Smooth friction shares itself out between both directions.
-            if (is_viscous(contact)) exit
-            do c = 1, 2
-               if (contact%side_1(c, i) /= 0 .or. contact%side_2(c, i) /= 0) cycle
-               if (.not. abs(speed(i, c)) > 0.0_wp) cycle
-               call reader%refuse('contact', 'speed_'//to_text(c), '= '//to_text(speed(i, c))// &
-                                  ' for pair '//to_text(i)//', which has no dof of t'// &
-                                  to_text(c)//': must be 0')
-               return
-            end do
-            law = contact%law
-            if (allocated(contact%law_of)) law = contact%law_of(i)
-            if (.not. is_of_high_order(law) .or. all(abs(speed(i, :)) <= 0.0_wp)) cycle
-            call reader%refuse('contact', 'sliding', "= 'path' with law = '"// &
-                               trim(law_words(law))//"' and a speed of pair "//to_text(i)// &
-                               ", whose anchor that law does not carry along: use sliding = "// &
-                               "'steady', or law = 'dlft'")
+      do i = 1, contact%n_pairs
+         if (all(abs(speed(i, :)) <= 0.0_wp)) cycle
+         law = contact%law
+         if (allocated(contact%law_of)) law = contact%law_of(i)
+         ! On the path smooth friction shares itself out between both directions.
+         if (contact%sliding == sliding_path .and. &
+             contact%constants%is_taken(law, 'slip_speed')) cycle
+         do c = 1, 2
+            if (contact%side_1(c, i) /= 0 .or. contact%side_2(c, i) /= 0) cycle
+            if (.not. abs(speed(i, c)) > 0.0_wp) cycle
+            call reader%refuse('contact', 'speed_'//to_text(c), '= '//to_text(speed(i, c))// &
+                               ' for pair '//to_text(i)//', which has no dof of t'// &
+                               to_text(c)//': must be 0')
             return
          end do
+         if (contact%sliding == sliding_steady .or. .not. is_of_high_order(law)) cycle
+         call reader%refuse('contact', 'sliding', "= 'path' with law = '"// &
+                            trim(law_words(law))//"' and a speed of pair "//to_text(i)// &
+                            ", whose anchor that law does not carry along: use sliding = "// &
+                            "'steady', or law = 'dlft'")
          return
-      end if
+      end do
+      if (contact%sliding == sliding_path) return
       if (any(abs(speed) > 0.0_wp)) return
       call reader%refuse('contact', 'sliding', "= '"//trim(sliding_words(sliding_steady))// &
                          "' needs a direction: give speed_1 or speed_2")

@@ -251,10 +251,18 @@ def test_no_remark_of_a_pair_that_never_touches(tmp_path):
     ({"law": "regularised", "slip_speed": 0.02, "mu_dynamic": 0.1, "weakening_speed": 1.0},
      "mu_dynamic beside sliding = 'steady'"),
     ({"law": "regularised", "slip_speed": 0.02, "mu_viscous": 0.1},
-     "mu_viscous beside sliding = 'steady'")])
+     "mu_viscous beside sliding = 'steady'"),
+    # Its heat along a direction that is not there would be left out.
+    ({"law": "penalty", "side_1": [4, 0, 6, 7, 0, 9]}, "for pair 1, which has no dof of t2"),
+    # One law that carries anchors along does not speak for another.
+    ({"law": ["regularised", "rigid"], "slip_speed": 0.02, "speed_2": [0.0, 0.0],
+      "sliding": "path"}, "a speed of pair 2, whose anchor that law does not carry along")])
 def test_refusals(tmp_path, change, message):
-    groups = steady(change["law"] if isinstance(change["law"], str) else "penalty")
+    first = change["law"] if isinstance(change["law"], str) else change["law"][0]
+    groups = steady(first)
     groups["contact"] |= change
+    if "rigid" in change["law"]:
+        groups["harmonics"] = {"n_harmonics": 9}
     if groups["contact"]["n_gap_terms"] == 0:
         for key in ("n_gap_terms", "gap_pair", "gap_harmonic", "gap_amplitude", "gap_phase"):
             del groups["contact"][key]
