@@ -25,8 +25,7 @@ turning the mesh, named by sets of corners, and by sets exchanged. Judge: the wh
 without symmetry; frequencies below the lowest of the sixth ones of each nodal diameter, to 1e-9.
 Then what has to be refused: another number of sectors, another axis, a node of one face moved along
 it, with the faces found and named. And what has to be remarked: sets that leave out a node of both
-faces. The direction of the wave that `--check` tells is judged by what a wave is: with the engine
-order negative, and with the axis reversed, it runs the other way in space.
+faces.
 """
 COUNT = 60
 SMALL = range(2)
