@@ -82,7 +82,7 @@ def levels_table(study: Study) -> list[str]:
              "|---|---|---|---|---|---|"]
     for one in study.levels:
         used = ("calibration" if one.name in CALIBRATED
-                else "prediction" if one.name in PREDICTED else "damping of the open end")
+                else "prediction" if one.name in PREDICTED else "damping without slip")
         lines.append(f"| {one.name} | {one.frequency:.3f} | {one.acceleration:.2f} | "
                      f"{one.force:.4f} | {1e3 * one.damping:.3f} | {used} |")
     return ["", *lines, "",
@@ -238,7 +238,7 @@ def picture(study: Study, path: Path) -> None:
     for axis, text in zip(axes, ("frequency [Hz]", "damping F/(2 m a) [1e-3]")):
         axis.set_xlabel("acceleration [m/s²]")
         axis.set_ylabel(text)
-    axes[0].legend(fontsize=7)
+    axes[0].legend(fontsize=7, loc="lower left")
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
