@@ -195,8 +195,8 @@ def _joined(p: BeamParameters, left: Floats, mass: Floats, stiffness: Floats) ->
     drive = _row(p, left, n)
     mass += p.drive_mass * np.outer(drive, drive)
     whole = p.density * p.width * p.thickness * p.length + 3.0 * p.bolt_mass + p.drive_mass
-    for node in (0, n - 3):
-        for dof in (node, node + 1):
+    for end in (0, n - 3):
+        for dof in (end, end + 1):
             stiffness[dof, dof] += 0.5 * whole * (2.0 * np.pi * p.suspension)**2
     rows = np.zeros((int(slips.sum()), n))
     for k, j in enumerate(np.flatnonzero(slips)):
