@@ -27,7 +27,8 @@ COLUMNS = {"solved": "solved", "rows": "solutions", "more": "cases with several"
            "rare": "rare ones missed",
            "wrong": "rows that solve nothing", "twice": "rows twice or out of order",
            "failed": "ended in words"}
-ZERO = ("missed", "wrong", "twice")
+#: A search promises nothing of what it does not find: that is counted and shown.
+ZERO = ("wrong", "twice")
 
 HARMONICS, INSTANTS, STARTS, MOST = 5, 128, 200, 30
 #: Starts of the judge that come to a solution that counts.
