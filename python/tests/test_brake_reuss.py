@@ -8,12 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg as la
 
 from fretwear.beam import BeamParameters, ReducedBeam, generate
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "example" / "brake_reuss"))
 
+import attempts
 import fit
+import hammer
 import methods
 from record import MASS, Level, Repeatability, repeatability
 
@@ -21,6 +24,8 @@ from record import MASS, Level, Repeatability, repeatability
 METHODS = 1e-3
 #: Splines between forces, and straight lines between frequencies 0.05 Hz apart.
 BETWEEN = 1e-2
+#: Of two reductions to four modes, with other coordinates held.
+REDUCED = 1e-5
 
 
 @pytest.fixture(scope="module", name="coarse")
@@ -80,3 +85,32 @@ def test_repeatability_is_the_scatter_that_was_put_in() -> None:
     found = repeatability(held + others)
     assert found.frequency == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-9)
     assert found.damping == pytest.approx(0.04 / np.sqrt(2.0), rel=1e-9)
+
+
+def test_pairs_with_normal_motion_are_the_same_joint() -> None:
+    """What was taken from the stiffness comes back by springs in the pairs."""
+    p = BeamParameters(arm_elements=6, lap_elements=16, n_modes=4)
+    opened = attempts.Opened.of(p)
+    n = len(opened.cell)
+    stiffness = opened.stiffness + np.diag(np.concatenate((
+        p.tangential_stiffness * opened.cell, p.normal_stiffness * opened.cell,
+        np.zeros(len(opened.mass) - 2 * n))))
+    values = la.eigh(stiffness, opened.mass, eigvals_only=True)
+    expected = generate(p).modes(1)[0][0]
+    assert np.sqrt(values[3]) / (2.0 * np.pi) == pytest.approx(expected, rel=REDUCED)
+
+
+def test_peaks_of_a_decay() -> None:
+    """Two modes and noise: frequencies and damping ratios that were put in."""
+    time = np.arange(-128, 5 * 12800) / 12800.0
+    after = np.maximum(time, 0.0)
+    rng = np.random.default_rng(4)
+    known = ((80.0, 1.5e-3, 30.0), (300.0, 1e-3, 50.0))
+    channel = sum(size * np.exp(-ratio * 2.0 * np.pi * f * after)
+                  * np.cos(2.0 * np.pi * f * after) * (time >= 0.0) for f, ratio, size in known)
+    found = hammer.peaks(time, np.array([channel + 0.01 * rng.standard_normal(len(time))]))
+    assert len(found) == 2
+    for one, (f, ratio, size) in zip(found, known):
+        assert one.frequency == pytest.approx((f, f), rel=1e-4)
+        assert one.damping == pytest.approx((ratio, ratio), rel=0.02)
+        assert one.acceleration == pytest.approx(size, rel=0.2)
