@@ -162,10 +162,9 @@ contains
       call keys%open('case', 'title, kind of analysis, threads')
       call keys%bind(key('title', 'stands in the result file', &
                          absent='title of the model file, or name of the namelist'), self%title)
-      call keys%bind_word(key('analysis', 'a sweep, one frequency, wear, '// &
-                              'integration in time, natural frequencies, a nonlinear '// &
-                              'mode, a resonance, a Campbell diagram, many mistuned '// &
-                              'disks, a range over residual tractions, or free decay'), &
+      call keys%bind_word(key('analysis', 'a sweep, a frequency, wear, integration in '// &
+                              'time, frequencies, a nonlinear mode, a resonance, a '// &
+                              'Campbell diagram, mistuned disks, a range, free decay'), &
                           self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)

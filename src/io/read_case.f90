@@ -20,6 +20,7 @@ module fw_read_case
    use fw_read_cyclic, only: check_sectors, read_cyclic, read_mistuning
    use fw_read_model, only: find_unit_system, read_model, read_loads, read_motion, finish_model, &
       stand_alone
+   use fw_read_nodal, only: find_nodal_stress
    use fw_read_options, only: read_campbell, read_harmonics, read_mission, read_mode, &
       read_population, read_stress, read_sweep
    use fw_read_output, only: read_control, read_output, read_observed
@@ -510,6 +511,7 @@ contains
       call read_loads(reader, options, raw, terms)
       if (.not. reader%failed()) call check_gap_orders(reader, gap_order, terms%fundamental, raw, &
                                                        case%model%cyclic)
+      call find_nodal_stress(reader, raw)
       call case%stress%take(raw%stress, options%rotation_speed)
       call read_motion(reader, case%model%cyclic%has_sectors(), raw, case%contact, case%springs, &
                        case%elements)

@@ -14,7 +14,7 @@ module fw_read_nodal
    implicit none (type, external)
    private
 
-   public :: finish_nodal, observe_nodal
+   public :: find_nodal_stress, finish_nodal, observe_nodal
 
    !> Entries of a Hermitian matrix may differ by this share of the largest one, and as much may be
    !> left of imaginary parts where they must vanish.
@@ -45,21 +45,22 @@ contains
             call put_together(reader, options, raw, parts, model%cyclic%nodal(k + 1), error)
             if (allocated(error)) return
             call add_waves(options, static, model, model%cyclic%nodal(k + 1))
+            if (allocated(parts%stress)) model%cyclic%nodal(k + 1)%stress = transpose(reshape( &
+               parts%stress, [size(parts%stress, 1), 6*size(parts%stress, 3)]))
          end associate
       end do
-      call take_stress(reader, raw, model)
       call stand_in(options, raw, model)
       model%cyclic%loss_factor = options%loss_factor
    end subroutine finish_nodal
 
    !> Rows of stress of every nodal diameter, or of none; what is asked for by displacements alone
    !> finds rows of zeros there.
-   subroutine take_stress(reader, raw, model)
+   subroutine find_nodal_stress(reader, raw)
       type(reader_type), intent(inout) :: reader
       type(raw_model), intent(inout) :: raw
-      type(model_type), intent(inout) :: model
       integer :: k, n_points
 
+      if (.not. allocated(raw%cyclic%nodal)) return
       n_points = 0
       do k = 1, size(raw%cyclic%nodal)
          associate (parts => raw%cyclic%nodal(k))
@@ -74,18 +75,15 @@ contains
          return
       end if
       do k = 1, size(raw%cyclic%nodal)
-         associate (parts => raw%cyclic%nodal(k), nodal => model%cyclic%nodal(k))
-            if (.not. allocated(parts%mass)) cycle
-            if (.not. allocated(parts%stress)) then
-               call reader%refuse_model('no nodal_diameter/'//to_text(k - 1)//'/stress/matrix, '// &
-                                        'which other nodal diameters have')
-               return
-            end if
-            nodal%stress = transpose(reshape(parts%stress, [size(parts%stress, 1), 6*n_points]))
+         associate (parts => raw%cyclic%nodal(k))
+            if (.not. allocated(parts%mass) .or. allocated(parts%stress)) cycle
+            call reader%refuse_model('no nodal_diameter/'//to_text(k - 1)//'/stress/matrix, '// &
+                                     'which other nodal diameters have')
+            return
          end associate
       end do
       allocate (raw%stress%matrix(raw%cyclic%n_physical, 6, n_points), source=0.0_wp)
-   end subroutine take_stress
+   end subroutine find_nodal_stress
 
    !> Loads of other harmonics, on the displacements in front.
    pure subroutine add_waves(options, static, model, nodal)
