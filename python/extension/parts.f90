@@ -21,6 +21,7 @@ module fw_python_parts
                               'modal_damping, aero/modes, aero/stiffness, '// &
                               'contact/side_1, contact/side_2, contact/gap, '// &
                               'contact/depth, contact/mu, contact/normal_load, '// &
+                              'contact/residual, contact/slider_1, contact/slider_2, '// &
                               'contact/tangential_stiffness, contact/normal_stiffness, '// &
                               'spring/coefficient, observe/matrix, n_springs, solver_tolerance'
 
@@ -91,6 +92,12 @@ contains
             if (allocated(contact%mu)) values = contact%mu
          case ('contact/normal_load')
             if (allocated(contact%normal_load)) values = contact%normal_load
+         case ('contact/residual')
+            if (allocated(contact%residual)) values = contact%residual
+         case ('contact/slider_1')
+            if (allocated(contact%slider_1)) values = contact%slider_1
+         case ('contact/slider_2')
+            if (allocated(contact%slider_2)) values = contact%slider_2
          case ('contact/tangential_stiffness')
             if (allocated(contact%tangential_stiffness)) values = contact%tangential_stiffness
          case ('contact/normal_stiffness')

@@ -25,7 +25,7 @@ walked to once more in 32 steps, so that no jump to another branch counts. The c
 to balance, and both ends to have the amplitudes that the result says.
 """
 COUNT = 100
-SMALL = (0, 1, 2, 3)
+SMALL = (0, 1, 3, 4)
 COLUMNS = {"solved": "solved", "refused": "refused", "failed": "ended in words",
            "wide": "wider than 1 %", "inside": "ends that are no corners",
            "lost": "shares that the judge did not reach", "centre": "centre off",
