@@ -199,8 +199,8 @@ def _joined(p: BeamParameters, left: Floats, mass: Floats, stiffness: Floats) ->
         for dof in (end, end + 1):
             stiffness[dof, dof] += 0.5 * whole * (2.0 * np.pi * p.suspension)**2
     rows = np.zeros((int(slips.sum()), n))
-    for k, j in enumerate(np.flatnonzero(slips)):
-        rows[k, upper[j]], rows[k, lower[j]] = 1.0, -1.0
+    pairs = np.arange(len(rows))
+    rows[pairs, upper[slips]], rows[pairs, lower[slips]] = 1.0, -1.0
     return FullBeam(p, sp.csr_array(mass), sp.csr_array(stiffness), sp.csr_array(rows),
                     place[slips], cell[slips], drive)
 
