@@ -93,8 +93,8 @@ class CaseGroup(TypedDict, total=False):
 
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
-    #: a sweep, one frequency, wear, integration in time, natural frequencies, a nonlinear mode, a
-    #: resonance, a Campbell diagram, many mistuned disks, a range over res (default: 'frf')
+    #: a sweep, a frequency, wear, integration in time, frequencies, a nonlinear mode, a resonance,
+    #: a Campbell diagram, mistuned disks, a range, free decay (default: 'frf')
     analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance", "campbell",
                       "population", "bounds", "ringdown"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
