@@ -25,6 +25,7 @@ from .build import (
     save,
 )
 from .checks import check_model
+from .contact import add_contact_arguments, pairs_of_options
 from .finding import Finding
 from .labels import Dofs, read_label_table
 from .matrices import FORMATS, read_matrices
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contact-rows", metavar="FILE[#NAME]", type=Source.of,
                         help="relative displacements t1, t2, n of the pairs, one after the other, "
                              "such as averages over patches")
+    add_contact_arguments(parser)
     parser.add_argument("--loads", type=Path, metavar="TABLE", help="loads by degree of freedom")
     parser.add_argument("--observe", action="append", default=[], metavar="NAME=DOF",
                         help="observed degree of freedom: number or node:component; repeatable")
@@ -193,6 +195,7 @@ def _read(options: argparse.Namespace) -> FullModel:
                     speeds=read_speeds(options.at_speed, options.format, model, options.mirror))
     model = drop(model, empty=options.drop_empty)
     model = replace(model, stress=_stress(options, model))
+    touching, said = pairs_of_options(options, model.dofs)
     observe = {}
     for text in options.observe:
         name, equals, dof = text.rpartition("=")
@@ -203,8 +206,8 @@ def _read(options: argparse.Namespace) -> FullModel:
             raise InputError(f"--observe {text}: the ground does not move")
     model = replace(
         model, observe=observe, title=options.title, unit_system=options.unit_system,
-        pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs,
-                                                               rows),
+        notes=[*model.notes, *said],
+        pairs=touching if options.pairs is None else read_pairs(options.pairs, model.dofs, rows),
         loads={} if options.loads is None else read_loads(options.loads, model.dofs),
         mesh=None if options.mesh is None else read_mesh_file(options.mesh))
     if options.blade_modes is not None and options.blade is None:
