@@ -25,6 +25,8 @@ fretwear.result, fretwear.bifurcation
     Results, and where their stability changes.
 fretwear.importer
     Models of other programs.
+fretwear.surfaces
+    Contact pairs of two surfaces of a mesh.
 fretwear.reduction
     Reduction of sparse models on relative displacements.
 fretwear.operators

@@ -244,7 +244,11 @@ def test_pairs_by_nodes_and_normals(tmp_path: Path) -> None:
     assert np.linalg.det(frame) == pytest.approx(1.0)
     arguments = ["import", str(FILES / "chain_substructure.mtx"), "-q", "--pairs",
                  str(FILES / "pairs_nodes.tsv"), "-o", str(tmp_path / "model.h5")]
-    assert main(arguments) == 3  # these are no degrees of freedom
+    assert main(arguments) == 0  # these are rows behind the degrees of freedom
+    with h5py.File(tmp_path / "model.h5") as file:
+        assert (file["row/matrix"][()] == rows).all()
+        assert file["contact/side_1"][()].tolist() == [[16, 17, 18], [19, 20, 21]]
+        assert not file["contact/side_2"][()].any()
     assert main([*arguments, "--reduce", "4"]) == 0
 
 

@@ -29,6 +29,7 @@ from .build import (
 )
 from .calculix import Job, deck_loads, find_job, supports_of
 from .checks import check_model
+from .contact import add_contact_arguments, pairs_of_options
 from .deck import Deck, read_deck
 from .finding import Finding
 from .labels import Dofs, read_label_table
@@ -94,6 +95,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contact-rows", metavar="FILE[#NAME]", type=Source.of,
                         help="relative displacements t1, t2, n of the pairs, one after the other, "
                              "such as averages over patches")
+    add_contact_arguments(parser)
     parser.add_argument("--loads", type=Path, metavar="TABLE", help="loads by degree of freedom")
     parser.add_argument("--load", action="append", default=[], metavar="DOF=VALUE",
                         help="cosine load of a degree of freedom, of each node of a set; "
@@ -250,6 +252,7 @@ def _read(options: argparse.Namespace) -> FullModel:
     fixed = {abs(dof) for text in options.fix for dof in _fixed(model.dofs, text)} - {0}
     model = drop(model, empty=options.drop_empty, fixed=fixed)
     model = replace(model, stress=_stress(options, model))
+    touching, said = pairs_of_options(options, model.dofs, None if job is None else job.deck)
     observe = {}
     for text in options.observe:
         name, equals, dof = text.rpartition("=")
@@ -262,8 +265,9 @@ def _read(options: argparse.Namespace) -> FullModel:
                                                     model.mesh.all_points))
     model = replace(
         model, observe=observe, title=options.title, unit_system=options.unit_system,
-        pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs,
-                                                            rows, places))
+        notes=[*model.notes, *said],
+        pairs=touching if options.pairs is None else read_pairs(options.pairs, model.dofs,
+                                                                rows, places))
     model = _loaded(model, options, deck)
     if options.blade_modes is not None and options.blade is None:
         raise InputError("--blade-modes goes with --blade TABLE")

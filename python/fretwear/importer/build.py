@@ -350,14 +350,11 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
                          "columns side_1_t1 ... side_2_n and sector_2")
     reduction: Reduction | None = None
     if n_modes is None:
-        if model.pairs is not None and model.pairs.rows is not None:
-            raise InputError("pairs given by nodes and normals, or by rows, are no degrees of "
-                             "freedom of the matrices; reduce the model with --reduce N_MODES")
         data: dict[str, NDArray[Any]] = {role: matrix.toarray()
                                          for role, matrix in symmetric.items()}
         data.update({f"load/{name}": load for name, load in model.loads.items()})
         if model.pairs is not None:
-            data["contact/side_1"], data["contact/side_2"] = model.pairs.side_1, model.pairs.side_2
+            data |= _sides_as_given(model.pairs, model.dofs.n)
         if model.interfaces is not None:
             data |= {"cyclic/left": model.interfaces.left, "cyclic/right": model.interfaces.right}
     else:
@@ -380,6 +377,16 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
         data["observe/name"] = strings(model.observe)
         data["observe/matrix"] = observed if n_modes is not None else observed.toarray()
     return data
+
+
+def _sides_as_given(pairs: Pairs, n: int) -> dict[str, NDArray[Any]]:
+    """Sides of pairs of a model that is not reduced; relative displacements that are combinations
+    of degrees of freedom have their numbers behind these."""
+    if pairs.rows is None:
+        return {"contact/side_1": pairs.side_1, "contact/side_2": pairs.side_2}
+    side_1 = np.where(pairs.side_1 != 0, pairs.side_1 + n, 0).astype(np.int32)
+    return {"contact/side_1": side_1, "contact/side_2": np.zeros_like(side_1),
+            "row/matrix": pairs.rows.toarray()}
 
 
 def _at_speeds(model: FullModel, data: dict[str, NDArray[Any]],

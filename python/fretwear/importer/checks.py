@@ -190,10 +190,12 @@ def _gaps(pairs: Pairs) -> Findings:
     if pairs.gap is None or pairs.area is None or not (pairs.area > 0.0).all():
         return
     edge = np.sqrt(pairs.area)
-    for where, gap, size in zip(pairs.where, pairs.gap, edge):
-        if abs(gap) > size:
-            yield Finding("warning", where, f"gap = {gap:.6g} exceeds the edge of the patch, "
-                          f"{size:.6g}; is it in the units of the model?")
+    wide = np.flatnonzero(np.abs(pairs.gap) > edge)
+    if len(wide):
+        k = int(wide[0])
+        more = f" (and {len(wide) - 1} more pairs)" if len(wide) > 1 else ""
+        yield Finding("warning", pairs.where[k], f"gap = {pairs.gap[k]:.6g} exceeds the edge of "
+                      f"the patch, {edge[k]:.6g}{more}; is it in the units of the model?")
 
 
 def _same_place(pairs: Pairs) -> Findings:
