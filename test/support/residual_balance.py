@@ -27,8 +27,8 @@ def march(y, q):
 
 
 class Balance:
-    """K, C, M (n, n), rows of the pairs along t and n (n_pairs, n), their constants (n_pairs), loads
-    (2H+1, n) and instants. `wrong` leaves dP out of z: a variant that tests are to notice."""
+    """K, C, M (n, n), rows of the pairs along t and n (n_pairs, n), their constants (n_pairs),
+    loads (2H+1, n) and instants. `wrong` leaves dP out of z: a variant that tests are to notice."""
 
     def __init__(self, M, C, K, along, across, mu, kt, kn, load, instants, gap=0.0, wrong=False):
         self.M, self.C, self.K = (np.asarray(a, float) for a in (M, C, K))

@@ -255,12 +255,12 @@ def _frames(normal: Floats, tangent: ArrayLike | None) -> Floats:
     else:
         given = np.asarray(tangent, dtype=float)
         if given.shape != (3,) or not np.isfinite(given).all() or not given.any():
-            raise InputError(f"tangent = {tangent}; must be three numbers, not all 0")
+            raise InputError(f"tangent = {tangent!r}; must be three numbers, not all 0")
         start = np.broadcast_to(given / np.linalg.norm(given), normal.shape)
     first = start - np.einsum("ij,ij->i", start, normal)[:, None] * normal
     length = np.linalg.norm(first, axis=1)
     if (length < 1e-6).any():
-        raise InputError(f"tangent = {tangent}; is along the normal of {int((length < 1e-6).sum())}"
+        raise InputError(f"tangent = {tangent!r}; is along the normal of {int((length < 1e-6).sum())}"
                          " pairs, must be across it")
     first /= length[:, None]
     return np.stack((first, np.cross(normal, first), normal), axis=1)

@@ -101,7 +101,7 @@ def draw_surfaces(surface_1: Surface, surface_2: Surface, *,
 
 def _outline(axes: Any, outlines: list[Floats], colours: list[str], plane: bool) -> None:
     from matplotlib.collections import LineCollection
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     if plane:
         axes.add_collection(LineCollection(outlines, colors=colours, linewidths=2.5))

@@ -71,13 +71,14 @@ def read_abaqus_deck(path: Path) -> Deck:
     deck.nodes = np.array(sorted(places), dtype=np.int64)
     deck.points = np.array([places[node] for node in deck.nodes.tolist()]).reshape(-1, 3)
     at = {node: k for k, node in enumerate(deck.nodes.tolist())}
-    for name, rows in elements.items():
+    for name, members in elements.items():
         try:
-            points = np.array([[at[node] for node in row[1:]] for row in rows], dtype=np.int64)
+            points = np.array([[at[node] for node in row[1:]] for row in members],
+                              dtype=np.int64)
         except KeyError as error:
             raise InputError(f"{path}: an element names node {error}, which the deck does not "
                              "have") from None
-        deck.cells.append(Cells(name.split()[0], points, np.array([row[0] for row in rows])))
+        deck.cells.append(Cells(name.split()[0], points, np.array([row[0] for row in members])))
     return deck
 
 

@@ -131,8 +131,7 @@ def _cells(deck: Deck, types: dict[int, int], elements: list[list[int]]) -> None
         kind = types.get(row[_TYPE], 0)
         nodes = row[_FIRST:_FIRST + row[_N_NODES]]
         if kind in _CONTACT or kind in _TARGET:
-            real = pairs.setdefault(row[_REAL], (set(), set()))
-            real[kind in _TARGET].add(row[_NUMBER])
+            pairs.setdefault(row[_REAL], (set(), set()))[kind in _TARGET].add(row[_NUMBER])
         for name, chosen in _shape(kind, nodes):
             try:
                 blocks.setdefault((name, len(chosen)), []).append(
