@@ -260,8 +260,9 @@ def _frames(normal: Floats, tangent: ArrayLike | None) -> Floats:
     first = start - np.einsum("ij,ij->i", start, normal)[:, None] * normal
     length = np.linalg.norm(first, axis=1)
     if (length < 1e-6).any():
-        raise InputError(f"tangent = {tangent!r}; is along the normal of {int((length < 1e-6).sum())}"
-                         " pairs, must be across it")
+        n_along = int((length < 1e-6).sum())
+        raise InputError(f"tangent = {tangent!r}; is along the normal of {n_along} pairs, must be "
+                         "across it")
     first /= length[:, None]
     return np.stack((first, np.cross(normal, first), normal), axis=1)
 
