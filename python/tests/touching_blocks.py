@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -38,12 +39,19 @@ HELD = 1e36
 
 
 class Block:
-    """A box of one kind of elements, inner grid lines at random places.
+    """A box of one kind of elements, inner grid lines at random places or at given ones.
+
+    Parameters
+    ----------
+    lines : three arrays, optional
+        Grid lines along x, y, z.
+    move : callable, optional
+        Of corners (3, n) of the box, to where they stand.
 
     Attributes
     ----------
     points : (n, 3)
-        Corners, then middles of edges.
+        Corners, then middles of edges; `box` has them before they are moved.
     cells : (n_cells, n_nodes) int
     stiffness, mass : (3 n, 3 n) sparse
         x, y, z of one node after the other.
@@ -52,16 +60,22 @@ class Block:
     """
 
     def __init__(self, kind: str, n: tuple[int, int, int], low: tuple[float, float, float],
-                 high: tuple[float, float, float], seed: int) -> None:
+                 high: tuple[float, float, float], seed: int,
+                 lines: Sequence[np.ndarray] | None = None,
+                 move: Callable[[np.ndarray], np.ndarray] | None = None) -> None:
         random = np.random.default_rng(seed)
-        lines = []
-        for count, a, b in zip(n, low, high):
-            line = np.linspace(a, b, count + 1)
-            line[1:-1] += 0.25 * (b - a) / count * random.uniform(-1.0, 1.0, count - 1)
-            lines.append(line)
+        if lines is None:
+            lines = []
+            for count, a, b in zip(n, low, high):
+                line = np.linspace(a, b, count + 1)
+                line[1:-1] += 0.25 * (b - a) / count * random.uniform(-1.0, 1.0, count - 1)
+                lines.append(line)
         make, element = _KINDS[kind]
         self.kind = kind
         mesh = make.init_tensor(*lines)
+        self.box = mesh.p.T.copy()
+        if move is not None:
+            mesh = make(move(mesh.p), mesh.t)
         basis = Basis(mesh, ElementVector(element()), intorder=4)
         lam, mu = lame_parameters(YOUNG, POISSON)
 
@@ -94,6 +108,7 @@ class Block:
                                  for a, b in _EDGES[corner.shape[1]]] for cell in corner.tolist()])
             self.cells = np.hstack((corner, len(self.points) + middles))
             self.points = np.vstack((self.points, self.points[mesh.edges].mean(axis=0)))
+            self.box = np.vstack((self.box, self.box[mesh.edges].mean(axis=0)))
 
 
 @dataclass
@@ -107,14 +122,15 @@ class Pile:
         self.first = np.concatenate(([0], np.cumsum([len(block.points) for block in self.blocks]))
                                     ).tolist()
         self.points = np.concatenate([block.points for block in self.blocks])
+        self.box = np.concatenate([block.box for block in self.blocks])
         self.stiffness = sp.csr_array(sp.block_diag([block.stiffness for block in self.blocks]))
         self.mass = sp.csr_array(sp.block_diag([block.mass for block in self.blocks]))
         self.numbers = 10 + 3 * np.random.default_rng(7).permutation(len(self.points))
 
     def nodes(self, block: int, axis: int, value: float) -> np.ndarray:
-        """Points of a block in a plane."""
+        """Points of a block in a plane of its box."""
         own = np.arange(self.first[block], self.first[block + 1])
-        return own[np.abs(self.points[own, axis] - value) < 1e-9]
+        return own[np.abs(self.box[own, axis] - value) < 1e-9]
 
     def write(self, folder: Path, held: np.ndarray, load: np.ndarray, deck: list[str]) -> None:
         """Matrices with held dofs (from 0), labels, static loads, and a deck that ends with `deck`.

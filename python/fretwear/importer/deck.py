@@ -9,6 +9,7 @@ Source: CalculiX CrunchiX USER'S MANUAL version 2.20, "Input deck format"; Abaqu
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -147,6 +148,8 @@ class _Reader:
         self.cards = list(_cards(path, path.parent, 0))
         self.axes: dict[int, tuple[str, Floats]] = {}
         self.place: dict[int, Floats] = {}
+        #: How many elements have a face, by its corners; counted where it is asked for.
+        self.shared: Counter[frozenset[int]] | None = None
 
     def deck(self) -> Deck:
         """Cards in the order that lets each use what it names, wherever it stands."""
@@ -242,13 +245,26 @@ class _Reader:
                       else self.found.element_sets.get(words[0]))
             if chosen is None:
                 raise InputError(f"{card.where}: there is no element set {words[0]}")
+            face = words[1] if len(words) > 1 else ""
             for element in chosen:
                 if element in self.found.elements:
-                    members += _face(*self.found.elements[element],
-                                     words[1] if len(words) > 1 else "", card.where)
+                    members += (_face(*self.found.elements[element], face, card.where) if face
+                                else self._outer(element))
         name = card.name("NAME")
         if name not in self.found.node_sets:
             self._into(self.found.node_sets, name, list(dict.fromkeys(members)))
+
+    def _outer(self, element: int) -> list[int]:
+        """Nodes of the faces of an element that no other shares: without a face these are meant."""
+        if self.shared is None:
+            self.shared = Counter(frozenset(corners) for kind, nodes in self.found.elements.values()
+                                  for corners in _corners(kind, nodes))
+        kind, nodes = self.found.elements[element]
+        faces = _corners(kind, nodes)
+        if not faces:
+            return nodes
+        return [node for k, corners in enumerate(faces) if self.shared[frozenset(corners)] == 1
+                for node in _face(kind, nodes, f"S{k + 1}", "")]
 
     def _transform(self, card: _Card) -> None:
         values = np.array([v for line in card.lines for v in _numbers(line, card.where)])
@@ -405,6 +421,12 @@ def _joined(card: _Card, n: int) -> Iterator[list[int]]:
     if numbers:
         raise InputError(f"{card.where}: element {numbers[0]} of type {card.name('TYPE')} has "
                          f"{len(numbers) - 1} nodes; expected {n}")
+
+
+def _corners(kind: str, nodes: list[int]) -> list[list[int]]:
+    """Corners of the faces of a solid; none of a shell."""
+    return [[nodes[k] for k in corners]
+            for corners in _FACES.get(kind.rstrip("0123456789"), ())]
 
 
 def _face(kind: str, nodes: list[int], face: str, where: str) -> list[int]:
