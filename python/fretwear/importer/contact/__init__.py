@@ -45,8 +45,8 @@ def add_contact_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mu", type=float, metavar="X",
                         help="friction coefficient of the pairs of --contact")
     parser.add_argument("--reach", type=float, metavar="X",
-                        help="gaps and overlaps of surfaces up to here become pairs (default: twice "
-                             "the largest distance of a corner from the middle of its face)")
+                        help="gaps and overlaps of surfaces up to here become pairs (default: "
+                             "twice the largest distance of a corner from the middle of its face)")
     parser.add_argument("--thickness", type=float, default=1.0, metavar="X",
                         help="of a plane mesh (default: 1)")
     parser.add_argument("--tangent", type=float, nargs=3, metavar=("X", "Y", "Z"),
