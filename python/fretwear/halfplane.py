@@ -237,6 +237,11 @@ def gross_slip(cylinder: Cylinder, displacement: float, *, n: int = 60,
     -------
     Model
         Dofs: n displacements along the normal, n along the tangent, the approach.
+
+    Raises
+    ------
+    InputError
+        A number is out of range, or the grid is no wider than the unworn contact.
     """
     _positive("displacement", displacement)
     reach = _REACH * cylinder.half_width if half_width is None else half_width
@@ -246,7 +251,8 @@ def gross_slip(cylinder: Cylinder, displacement: float, *, n: int = 60,
     cells = Cells(whole("n", n, 2), 2.0 * reach / n)
     held, size = _stiffness(cylinder, cells, datum), 2 * n + 1
     cosine = np.zeros(size)
-    # The flat slides past the cells, which is a load on those that stick to nothing.
+    # The cylinder stands and the flat moves, its cells with it: forces on the cells balance
+    # K (x - motion), and K times the motion is a load.
     cosine[n:2 * n] = -displacement * held.sum(axis=1)
     return _model(cylinder, cells, held, size, cosine=cosine, side_1=(0, 0, 2 * n + 1),
                   title=f"Cylinder on flat, amplitude {displacement:g}", unit_system=unit_system,
@@ -274,6 +280,11 @@ def partial_slip(case: PartialSlip, *, n: int = 60, datum: float | None = None,
     -------
     Model
         Dofs: n displacements along the normal, n along the tangent, the approach, the motion.
+
+    Raises
+    ------
+    InputError
+        n is no multiple of what ends the cells at the rim of the zone that sticks.
     """
     reach = math.ceil(_BEYOND_THE_SCAR * case.scar_half_width / case.stick_half_width)
     if whole("n", n, 2) % (2 * reach):

@@ -374,6 +374,23 @@ def test_decks(tmp_path: Path) -> None:
             middles[middle])
 
 
+def test_surface_of_solids_without_a_face(tmp_path: Path) -> None:
+    """It is what is free of them: of eight cubes all nodes but the one in the middle."""
+    places = [(i, j, k) for k in range(3) for j in range(3) for i in range(3)]
+    corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1),
+               (0, 1, 1))
+    cubes = [[1 + i + a + 3 * (j + b) + 9 * (k + c) for a, b, c in corners]
+             for i, j, k in places if max(i, j, k) < 2]
+    (tmp_path / "cubes.inp").write_text(
+        "*NODE\n" + "".join(f"{n}, {x}, {y}, {z}\n" for n, (x, y, z) in enumerate(places, 1))
+        + "*ELEMENT, TYPE=C3D8, ELSET=ALL\n"
+        + "".join(f"{n}, {', '.join(map(str, cube))}\n" for n, cube in enumerate(cubes, 1))
+        + "*SURFACE, NAME=SKIN\nALL,\n*SURFACE, NAME=CORNER\n1\n")
+    deck = read_deck(tmp_path / "cubes.inp")
+    assert sorted(deck.node_sets["SKIN"]) == [n for n in range(1, 28) if n != 14]
+    assert sorted(deck.node_sets["CORNER"]) == sorted(set(cubes[0]) - {14})
+
+
 @pytest.mark.parametrize(("text", "words"), [
     ("*NODE, SYSTEM=C\n1, 0, 0\n", "*NODE makes nodes"),
     ("*NODE\n1, 0, x\n", "expected numbers"),

@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, OutputError
 
-__all__ = ["EDGES", "Deck", "NodalLoad", "read_deck"]
+__all__ = ["EDGES", "FACES", "Card", "Deck", "NodalLoad", "cards", "read_deck"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,10 +33,12 @@ EDGES = {"triangle6": ((0, 1), (1, 2), (2, 0)),
          "hexahedron20": ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
                           (1, 5), (2, 6), (3, 7))}
 #: Corners of the faces S1, S2, ... of solids.
-_FACES = {"tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-          "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
-          "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3),
-                         (3, 7, 4, 0))}
+FACES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3),
+                   (3, 7, 4, 0))}
 #: Cells of solids and of surfaces by the number of their nodes.
 _SOLIDS = {4: "tetra", 10: "tetra10", 5: "pyramid", 13: "pyramid13", 6: "wedge", 15: "wedge15",
            8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
@@ -117,8 +120,20 @@ class Deck:
 
 
 @dataclass(frozen=True)
-class _Card:
-    """A keyword with its parameters and its data lines."""
+class Card:
+    """A keyword with its parameters and its data lines.
+
+    Attributes
+    ----------
+    where : str
+        File and line, for messages.
+    word : str
+        The keyword in capital letters, without its star.
+    parameters : dict of str to str
+        By names in capital letters, without blanks.
+    lines : list of str
+        Of data.
+    """
 
     where: str
     word: str
@@ -145,11 +160,9 @@ def read_deck(path: str | Path) -> Deck:
 class _Reader:
     def __init__(self, path: Path) -> None:
         self.found = Deck(path)
-        self.cards = list(_cards(path, path.parent, 0))
+        self.cards = list(cards(path))
         self.axes: dict[int, tuple[str, Floats]] = {}
         self.place: dict[int, Floats] = {}
-        #: How many elements have a face, by its corners; counted where it is asked for.
-        self.shared: Counter[frozenset[int]] | None = None
 
     def deck(self) -> Deck:
         """Cards in the order that lets each use what it names, wherever it stands."""
@@ -203,7 +216,7 @@ class _Reader:
             self.found.blocks.append((kind, np.array(rows, dtype=np.int64).reshape(-1, n)
                                       if n else np.zeros((len(read), 0), dtype=np.int64)))
 
-    def _set(self, card: _Card) -> None:
+    def _set(self, card: Card) -> None:
         """*NSET or *ELSET: numbers, ranges, other sets."""
         of_nodes = card.word == "NSET"
         sets = self.found.node_sets if of_nodes else self.found.element_sets
@@ -232,7 +245,7 @@ class _Reader:
                     raise InputError(f"{card.where}: there is no set {word} above it")
         self._into(sets, card.name(card.word), members)
 
-    def _surface(self, card: _Card) -> None:
+    def _surface(self, card: Card) -> None:
         """A surface of nodes, or of faces of elements: its nodes, those in the middle of edges
         too."""
         members: list[int] = []
@@ -245,28 +258,29 @@ class _Reader:
                       else self.found.element_sets.get(words[0]))
             if chosen is None:
                 raise InputError(f"{card.where}: there is no element set {words[0]}")
-            face = words[1] if len(words) > 1 else ""
+            label = words[1] if len(words) > 1 else ""
             for element in chosen:
                 if element in self.found.elements:
-                    members += (_face(*self.found.elements[element], face, card.where) if face
-                                else self._outer(element))
+                    kind, nodes = self.found.elements[element]
+                    # A solid without a face stands for those that are free.
+                    for face in [label] if label or not _faces(kind) else self._free(kind, nodes):
+                        members += _face(kind, nodes, face, card.where)
         name = card.name("NAME")
         if name not in self.found.node_sets:
             self._into(self.found.node_sets, name, list(dict.fromkeys(members)))
 
-    def _outer(self, element: int) -> list[int]:
-        """Nodes of the faces of an element that no other shares: without a face these are meant."""
-        if self.shared is None:
-            self.shared = Counter(frozenset(corners) for kind, nodes in self.found.elements.values()
-                                  for corners in _corners(kind, nodes))
-        kind, nodes = self.found.elements[element]
-        faces = _corners(kind, nodes)
-        if not faces:
-            return nodes
-        return [node for k, corners in enumerate(faces) if self.shared[frozenset(corners)] == 1
-                for node in _face(kind, nodes, f"S{k + 1}", "")]
+    def _free(self, kind: str, nodes: list[int]) -> list[str]:
+        """Faces of a solid that no other cell of the deck has."""
+        return [f"S{k}" for k, corners in enumerate(_faces(kind), 1)
+                if self._count[frozenset(nodes[corner] for corner in corners)] == 1]
 
-    def _transform(self, card: _Card) -> None:
+    @cached_property
+    def _count(self) -> Counter[frozenset[int]]:
+        """How many solids have a face, by its corners."""
+        return Counter(frozenset(nodes[corner] for corner in corners)
+                       for kind, nodes in self.found.elements.values() for corners in _faces(kind))
+
+    def _transform(self, card: Card) -> None:
         values = np.array([v for line in card.lines for v in _numbers(line, card.where)])
         if len(values) < 6:
             raise InputError(f"{card.where}: expected six coordinates")
@@ -294,7 +308,7 @@ class _Reader:
             self.found.notes.append(f"{self.found.path}: loads of *{spread} are left out; loads "
                                     "of nodes (*CLOAD) are read")
 
-    def _boundary(self, card: _Card, line: str) -> None:
+    def _boundary(self, card: Card, line: str) -> None:
         words = [word.strip().upper() for word in line.split(",")]
         nodes = self._named(words[0], card.where)
         if len(words) > 1 and words[1] in _SUPPORTS:
@@ -310,7 +324,7 @@ class _Reader:
         for node in nodes:
             self.found.supports.update((node, component) for component in components)
 
-    def _load(self, card: _Card, line: str, step: int, kind: str) -> None:
+    def _load(self, card: Card, line: str, step: int, kind: str) -> None:
         words = [word.strip() for word in line.split(",")]
         try:
             component, value = int(words[1]), float(words[2])
@@ -349,7 +363,7 @@ class _Reader:
             raise InputError(f"{where}: there is no node set {word}")
         return self.found.node_sets[word]
 
-    def _of(self, word: str) -> Iterator[_Card]:
+    def _of(self, word: str) -> Iterator[Card]:
         return (card for card in self.cards if card.word == word)
 
     @staticmethod
@@ -358,13 +372,22 @@ class _Reader:
             sets[name] = list(dict.fromkeys([*sets.get(name, []), *members]))
 
 
-def _cards(path: Path, folder: Path, depth: int) -> Iterator[_Card]:
-    """Keywords with their data; included files in their place."""
+def cards(path: Path, folder: Path | None = None, depth: int = 0) -> Iterator[Card]:
+    """Keywords with their data; included files, named from the folder of the deck, in their place.
+
+    Raises
+    ------
+    InputError
+        Files include each other.
+    OutputError
+        A file cannot be read.
+    """
+    folder = path.parent if folder is None else folder
     try:
         lines = path.read_text(encoding="latin-1").splitlines()
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {error.strerror}") from None
-    card: _Card | None = None
+    card: Card | None = None
     k = 0
     while k < len(lines):
         line, number = lines[k].strip(), k + 1
@@ -381,13 +404,13 @@ def _cards(path: Path, folder: Path, depth: int) -> Iterator[_Card]:
         pairs = (part.partition("=") for part in parameters)
         if card is not None:
             yield card
-        card = _Card(f"{path}, line {number}", " ".join(word.upper().split()),
-                     {key.strip().upper().replace(" ", ""): value.strip().strip('"')
+        card = Card(f"{path}, line {number}", " ".join(word.upper().split()),
+                     {key.strip().upper().replace(" ", ""): value.strip().strip("'\"")
                       for key, _, value in pairs}, [])
         if card.word == "INCLUDE":
             if depth == _DEEPEST:
                 raise InputError(f"{card.where}: files include each other")
-            yield from _cards(folder / card.parameters.get("INPUT", ""), folder, depth + 1)
+            yield from cards(folder / card.parameters.get("INPUT", ""), folder, depth + 1)
             card = None
     if card is not None:
         yield card
@@ -403,7 +426,7 @@ def _cell(name: str) -> tuple[str, int]:
     return name or "of no type", 0
 
 
-def _joined(card: _Card, n: int) -> Iterator[list[int]]:
+def _joined(card: Card, n: int) -> Iterator[list[int]]:
     """Element and node numbers, over as many lines as they take."""
     numbers: list[int] = []
     for line in card.lines:
@@ -423,16 +446,15 @@ def _joined(card: _Card, n: int) -> Iterator[list[int]]:
                          f"{len(numbers) - 1} nodes; expected {n}")
 
 
-def _corners(kind: str, nodes: list[int]) -> list[list[int]]:
-    """Corners of the faces of a solid; none of a shell."""
-    return [[nodes[k] for k in corners]
-            for corners in _FACES.get(kind.rstrip("0123456789"), ())]
+def _faces(kind: str) -> tuple[tuple[int, ...], ...]:
+    """Corners of the faces of a solid; of other cells there are none."""
+    return FACES.get(kind.rstrip("0123456789"), ())
 
 
 def _face(kind: str, nodes: list[int], face: str, where: str) -> list[int]:
     """Nodes of a face S1, S2, ...; of a shell all of them."""
-    faces = _FACES.get(kind.rstrip("0123456789"))
-    if faces is None:
+    faces = _faces(kind)
+    if not faces:
         return nodes
     if not (face.startswith("S") and face[1:].isdigit() and 1 <= int(face[1:]) <= len(faces)):
         raise InputError(f"{where}: '{face}' is no face of a {kind}; expected S1 to "

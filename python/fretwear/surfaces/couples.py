@@ -3,7 +3,7 @@
 A pair belongs to a corner k of surface 1 with its linear function N_k. Its area, gap and relative
 displacement are integrals over the part where the surfaces face each other,
 
-    A_k = int N_k,   g_k = n_k . int N_k (x_2 - x_1) / A_k,   u_k = int N_k (u_1 - u_2) / A_k,
+    A_k = int N_k,   g_k = n_k . int N_k (x_1 - x_2) / A_k,   u_k = int N_k (u_1 - u_2) / A_k,
 
 so that forces A_k p do the work of a constant pressure p on both surfaces, whatever their meshes.
 """
@@ -22,6 +22,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from .picture import RefusedSurfaces
 from .segments import Coverage, Side, Weights, cover, integrate, side_of
+from .shapes import CORNERS
 from .surface import Surface
 
 __all__ = ["SurfacePairs", "contact_pairs"]
@@ -95,7 +96,8 @@ def contact_pairs(surface_1: Surface, surface_2: Surface, *, reach: float | None
         Of one mesh. Surface 1 carries the pairs, one at each corner that faces surface 2; take the
         finer one.
     reach : float, optional
-        Gaps and overlaps up to here become pairs [L]; without it the longest edge of either.
+        Gaps and overlaps up to here become pairs [L]; without it twice the largest distance of a
+        corner from the middle of its facet.
     tangent : sequence of float, optional
         Direction that t1 is to follow; without it the global axis that is least along the normal.
     thickness : float
@@ -107,7 +109,7 @@ def contact_pairs(surface_1: Surface, surface_2: Surface, *, reach: float | None
         The surfaces lie apart, are inside out, or face each other twice; its `save(path)` draws
         where.
     InputError
-        They are not of one mesh, or share faces.
+        They are not of one mesh, or share faces; `reach` or `thickness` is not above 0.
     """
     _check_mesh(surface_1, surface_2)
     if not (np.isfinite(thickness) and thickness > 0.0):
@@ -218,8 +220,6 @@ def _merged(weights: Weights, surface: Surface) -> Weights:
 
 
 def _corners(surface: Surface, face: int) -> Ints:
-    from .shapes import CORNERS
-
     return surface.nodes[face, :CORNERS[surface.kind[face]]]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .shapes import CORNERS, NODES, corner_functions
+from .shapes import CORNERS, NODES, corner_functions, shape_functions
 
 __all__ = ["Facets", "Surface", "facets_of"]
 
@@ -195,8 +195,6 @@ def _is_curved(points: Floats, kind: str, nodes: Ints) -> bool:
 
 def _places(points: Floats, kinds: NDArray[Any], nodes: Ints, local: Floats) -> Floats:
     """Positions (n, m, 3) of local coordinates (n, m, 2); curved edges by their middles."""
-    from .shapes import shape_functions
-
     place = np.zeros((*local.shape[:2], 3))
     for kind in np.unique(kinds):
         which = np.flatnonzero(kinds == kind)

@@ -45,8 +45,8 @@ def add_contact_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mu", type=float, metavar="X",
                         help="friction coefficient of the pairs of --contact")
     parser.add_argument("--reach", type=float, metavar="X",
-                        help="gaps and overlaps of surfaces up to here become pairs (default: the "
-                             "longest edge)")
+                        help="gaps and overlaps of surfaces up to here become pairs (default: "
+                             "twice the largest distance of a corner from the middle of its face)")
     parser.add_argument("--thickness", type=float, default=1.0, metavar="X",
                         help="of a plane mesh (default: 1)")
     parser.add_argument("--tangent", type=float, nargs=3, metavar=("X", "Y", "Z"),
@@ -124,6 +124,13 @@ def pairs_of_surfaces(deck: Deck, couples: Sequence[Couple], dofs: Dofs, *,
         With rows of relative displacements.
     notes : list of str
         What faces each other, and what does not.
+
+    Raises
+    ------
+    RefusedSurfaces
+        Surfaces of a couple do not face each other; the picture says where.
+    InputError
+        The matrices name no nodes, or the deck has no surface of such a name.
     """
     if dofs.labels is None:
         raise InputError("--contact: the files name no nodes, which tie the surfaces to the "

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputError, OutputError
+from ...errors import InputError
+from ..deck import cards
 from .deck import Couple, Deck
 from .skin import Cells
 
@@ -21,10 +21,6 @@ _TYPES = (
     (r"CP[SE]G?[36]\w*|S3\w*|S6\w*|STRI\d+|M3D[36]\w*|SFM3D[36]\w*", "triangle"),
     (r"CP[SE]G?[48]\w*|S4\w*|S8\w*|M3D[48]\w*|SFM3D[48]\w*", "quad"),
 )
-#: Deepest nesting of *INCLUDE.
-_DEEPEST = 20
-
-Block = tuple[str, dict[str, str], list[str]]
 
 
 def read_abaqus_deck(path: Path) -> Deck:
@@ -35,7 +31,9 @@ def read_abaqus_deck(path: Path) -> Deck:
     declared: list[tuple[str, str, str]] = []
     friction: dict[str, float] = {}
     interaction = ""
-    for keyword, words, data in _blocks(path):
+    for card in cards(path):
+        keyword, data = card.word, card.lines
+        words = {key: value.upper() for key, value in card.parameters.items()}
         if keyword == "INSTANCE":
             raise InputError(f"{path}: holds *INSTANCE; write a flat deck, without parts and "
                              "assemblies, whose node numbers are those of the matrices")
@@ -153,32 +151,3 @@ def _numbers(path: Path, line: str) -> list[float]:
         return [float(word) for word in line.split(",") if word.strip()]
     except ValueError:
         raise InputError(f"{path}: '{line.strip()}' must be numbers, separated by commas") from None
-
-
-def _blocks(path: Path, depth: int = 0) -> Iterator[Block]:
-    """Keyword, parameters and data lines of every block, includes followed."""
-    try:
-        lines = path.read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be read: {error.strerror}") from None
-    current: Block | None = None
-    for line in lines:
-        if line.startswith("**") or not line.strip():
-            continue
-        if not line.startswith("*"):
-            if current is not None:
-                current[2].append(line)
-            continue
-        if current is not None:
-            yield current
-        keyword, *rest = (word.strip() for word in line[1:].split(","))
-        pairs = [word.partition("=") for word in rest]
-        words = {key.strip().upper(): value.strip() for key, _, value in pairs}
-        current = (keyword.upper(), {key: value.upper() for key, value in words.items()}, [])
-        if current[0] == "INCLUDE":
-            if depth >= _DEEPEST:
-                raise InputError(f"{path}: *INCLUDE goes deeper than {_DEEPEST} files")
-            yield from _blocks(path.parent / words.get("INPUT", "").strip("'\""), depth + 1)
-            current = None
-    if current is not None:
-        yield current

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...surfaces import Surface
+from ..deck import EDGES, FACES
 
 __all__ = ["CELLS", "Cells", "Faces", "faces_of", "surface_of"]
 
@@ -19,26 +20,13 @@ Ints = NDArray[np.int64]
 #: Corners and dimension of the cells that have faces, by their linear names in meshio.
 CELLS = {"tetra": (4, 3), "hexahedron": (8, 3), "wedge": (6, 3), "pyramid": (5, 3),
          "triangle": (3, 2), "quad": (4, 2)}
-#: Corners of the faces in the order in which Abaqus numbers them.
+#: Corners of the faces of solids as Abaqus numbers them, and of the edges of plane cells.
 _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
-    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3),
-                   (3, 7, 4, 0)),
-    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
-    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-}
-#: Edges whose middles follow the corners.
+    **FACES, "triangle": ((0, 1), (1, 2), (2, 0)), "quad": ((0, 1), (1, 2), (2, 3), (3, 0))}
+#: Edges whose middles follow the corners, by linear names.
 _EDGES: dict[str, tuple[tuple[int, int], ...]] = {
-    "tetra": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hexahedron": ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5),
-                   (2, 6), (3, 7)),
-    "wedge": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
-    "pyramid": ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-}
+    **{kind.rstrip("0123456789"): edges for kind, edges in EDGES.items()},
+    "pyramid": ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))}
 _KIND = {(2, False): "line", (2, True): "line3", (3, False): "triangle", (3, True): "triangle6",
          (4, False): "quad", (4, True): "quad8"}
 
