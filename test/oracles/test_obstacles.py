@@ -412,7 +412,7 @@ def bad(**contact):
     (bad(memory="carried"), "contact%memory = 'carried' does not go with"),
     ({"case": {"analysis": "mode"}, "mode": {"start": 1e-4, "end": 1e-3},
       "sweep": {"start": None}}, "a mode is a motion without excitation"),
-    ({"sweep": {"stability": True}}, "sweep%stability = .true. does not go with"),
+    ({"sweep": {"stability": True}}, "sweep%stability = .true. does not go with a side 2 that slides"),
     ({"harmonics": {"parity": "odd"}}, "a moving side")])
 def test_refusals(tmp_path, change, message):
     groups = at(oracle("v4_rub_path")["groups"], 100.0)
