@@ -43,8 +43,9 @@ WEDGE = """
 @pytest.mark.parametrize(("analysis", "group", "title"), [
     ("ringdown", "&ringdown amplitude = 0.01, n_cycles = 4 /", "ringdown"),
     ("bounds", "&sweep start = 1.6, end = 2.0, n_points = 3 /", "bounds")])
-def test_a_result_is_drawn_without_a_kind(analysis, group, title):
-    result = fretwear.run(fretwear.Case.from_text(f"&case analysis = '{analysis}' /{WEDGE}{group}"))
+def test_a_result_is_drawn_without_a_kind(analysis, group, title, tmp_path):
+    case = fretwear.Case.from_text(f"&case analysis = '{analysis}' /{WEDGE}{group}")
+    result = fretwear.run(case, tmp_path / "case.h5")
     assert len(result.plot().axes) == len(result.plot(title).axes)
     assert [line.get_xydata().tolist() for axes in result.plot().axes for line in axes.lines] == [
         line.get_xydata().tolist() for axes in result.plot(title).axes for line in axes.lines]
