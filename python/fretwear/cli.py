@@ -42,6 +42,9 @@ COMMANDS = {
     "study": ("study", "a parameter study on all local cores or a cluster"),
 }
 
+#: Modules of this package that make models of their own: no subcommands.
+_GENERATORS = ("beam", "disk", "halfplane", "sector")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one subcommand; returns the exit status."""
@@ -69,7 +72,9 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """The parser; only the module of the subcommand at hand is imported."""
     parser = HintingParser(
         prog="fretwear", allow_abbrev=False,
-        description="Pictures, reports, models and studies around fw_run.")
+        description="Pictures, reports, models and studies around fw_run.",
+        epilog="Models to begin with: " + ", ".join(f"python -m fretwear.{name}"
+                                                    for name in _GENERATORS) + ".")
     parser.add_argument("--version", action="version", version=f"fretwear {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     wanted = next((word for word in words if not word.startswith("-")), None)
@@ -80,6 +85,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             module = importlib.import_module(f"fretwear.{module_name}")
             module.add_arguments(command)
             command.set_defaults(run=module.main)
+    if wanted in _GENERATORS:
+        parser.error(f"{wanted} is no command: its model is made by python -m fretwear.{wanted}")
     return parser
 
 

@@ -345,7 +345,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="fretwear.halfplane", allow_abbrev=False,
+    parser = _Parser(prog="python -m fretwear.halfplane", allow_abbrev=False,
                      description="A model file of a cylinder on a flat, for wear in gross or in "
                                  "partial slip.")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.h5",

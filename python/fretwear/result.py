@@ -40,7 +40,8 @@ DIRECTIONS = ("t1", "t2", "n")
 #: Contact states, in the order of `Result.fraction`.
 STATES = ("stick", "slip", "open")
 #: Kinds of pictures that show a whole run, the best one first.
-_WHOLE = ("wear_evolution", "mode", "resonance", "response", "nodal_diameters", "cycle")
+_WHOLE = ("wear_evolution", "mode", "resonance", "bounds", "response", "nodal_diameters", "cycle",
+          "ringdown", "campbell", "population")
 
 
 class Result(ResultFile):
@@ -567,7 +568,7 @@ class Result(ResultFile):
         ----------
         kind : str, optional
             As of `fretwear plot --kind`; what shows the whole run without it: response, mode,
-            resonance, wear over the cycles, natural frequencies, or one cycle.
+            resonance, wear over the cycles, natural frequencies, a range, a decay, or one cycle.
         observe : str, optional
             Observed quantity; the first one without it.
         point : int, optional

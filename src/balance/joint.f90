@@ -315,6 +315,7 @@ contains
       type(spring_type), intent(in) :: springs
       type(element_list), intent(in) :: elements
       logical, intent(out), allocatable :: moving(:)
+      real(wp) :: speed(contact%n_pairs, 2)
       integer :: i, c, n_moving, p
       logical :: interferes
 
@@ -329,6 +330,7 @@ contains
          if (allocated(model%cyclic%speed%growth%load)) moving(1:) = moving(1:) .or. &
             any(abs(model%cyclic%speed%growth%load) > 0.0_wp, dim=2)
       end if
+      speed = contact%speeds()
       do i = 1, contact%n_pairs
          ! An interference pushes both sides.
          interferes = contact%gap(i) < 0.0_wp
@@ -341,6 +343,11 @@ contains
             any(abs(contact%gap_sine(i, :)) > 0.0_wp)
          if (interferes) moving(dofs_of(model, [contact%side_1(3, i), contact%side_2(3, i)])) = &
             .true.
+         ! A side that slides drags both along the face, whatever else rests.
+         do c = 1, 2
+            if (abs(speed(i, c)) > 0.0_wp) moving(dofs_of(model, [contact%side_1(c, i), &
+                                                                 contact%side_2(c, i)])) = .true.
+         end do
          ! A traction that the assembly has left does so along the face.
          if (is_strained(contact, i)) moving(dofs_of(model, [contact%side_1(:2, i), &
                                                             contact%side_2(:2, i)])) = .true.

@@ -297,6 +297,8 @@ contains
          asked = pairs .and. .not. facts%measures_slip
       case ('a law without Floquet multipliers')
          asked = pairs .and. .not. facts%has_multipliers
+         ! Where it is the side that slides, another law does not help, and a rule names the side.
+         if (asked) asked = facts%acts_at_once .or. .not. case%contact%slides()
       case default
          asked = .false.
          known = .false.

@@ -227,7 +227,7 @@ module fw_rules
       rule_type('a law that does not measure slip', "case%analysis = 'wear'", &
                 "use 'dlft' (nodes without mass), 'dlft_velocity' or 'penalty'"), &
       rule_type('sweep%stability = .true.', 'a law without Floquet multipliers', &
-                "use contact%law = 'penalty'")]
+                "use contact%law = 'penalty' without normal_law, or leave stability out")]
 
    !> Obstacles that move drive the vibration, and are no part of a perturbation.
    type(rule_type), parameter :: of_obstacles(*) = [ &

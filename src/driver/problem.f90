@@ -18,7 +18,7 @@ module fw_problem
    use fw_moved_parameter, only: moved_parameter
    use fw_moved_structure, only: meets_modes, move_structure, put_fullest
    use fw_parameter_sweep, only: as_factor
-   use fw_parameters, only: gap, harmonic_scale, is_of_matrices
+   use fw_parameters, only: gap, harmonic_scale, is_of_matrices, slider_1, slider_2
    use fw_plain_structure, only: new_plain_structure, plain_structure
    use fw_reduction, only: held_basis
    use fw_sector_means, only: means_none, means_split
@@ -148,8 +148,8 @@ contains
       ! A perturbation moves what no load moves.
       skip_idle = case%solver%skips .and. .not. case%sweep%stability .and. &
                   .not. analyses(case%analysis)%is_free
-      ! A gap that closes into an interference does so too.
-      if (case%over%number == gap) skip_idle = .false.
+      ! A gap that closes into an interference does so too, and a slider that leaves 0.
+      if (any(case%over%number == [gap, slider_1, slider_2])) skip_idle = .false.
       call new_joint(case%model, case%contact, case%springs, case%elements, skip_idle, joint, &
                      error)
       if (allocated(error)) return

@@ -63,6 +63,36 @@ def test_harmonic_0_is_the_gap(tmp_path):
     assert distance(found.coefficients, wanted.coefficients) < 1e-10
 
 
+# Nothing but the surface moves along the face: the pair stays pressed and the motion is closed form.
+@pytest.mark.parametrize("contact", (
+    {"sliding": "path"}, {"sliding": "steady"}, {"sliding": "steady", "speed_1": [-5.0]},
+    {"sliding": "path", "gap_amplitude": [0.0]}))
+def test_a_surface_drags_what_no_load_moves(tmp_path, contact):
+    mu, press, omega = 0.3, 0.1, 0.4
+    found = run_case(tmp_path, {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 1.0], "stiffness": [1.0, 0.0, 0.0, 2.0],
+                  "damping": [0.04, 0.0, 0.0, 0.04]},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 2], "mu": [mu],
+                    "tangential_stiffness": [1.0], "normal_stiffness": [1.0], "gap": [-press],
+                    "n_gap_terms": 1, "gap_harmonic": [2], "gap_amplitude": [0.02],
+                    "speed_1": [5.0], **contact},
+        "harmonics": {"n_harmonics": 3}, "sweep": {"start": omega},
+        "output": {"observe": [1, 2]}})
+
+    def stiffness(k):
+        return k - (2.0 * omega) ** 2 + 0.04j * 2.0 * omega
+
+    amplitude = contact.get("gap_amplitude", [0.02])[0]
+    normal = np.array([press / 3.0, -amplitude / stiffness(3.0)])
+    pressure = np.array([press, -amplitude]) - normal
+    drag = mu * np.sign(contact.get("speed_1", [5.0])[0]) * pressure
+    wanted = np.zeros((7, 2))
+    for dof, (mean, wave) in enumerate(((drag[0], drag[1] / stiffness(1.0)), normal)):
+        wanted[[0, 3, 4], dof] = np.real(mean), np.real(wave), -np.imag(wave)
+    assert distance(found.coefficients[0], wanted) < 1e-9
+
+
 def shifted(coefficients, angle):
     """The motion of tau - angle."""
     moved = np.array(coefficients)
@@ -382,7 +412,7 @@ def bad(**contact):
     (bad(memory="carried"), "contact%memory = 'carried' does not go with"),
     ({"case": {"analysis": "mode"}, "mode": {"start": 1e-4, "end": 1e-3},
       "sweep": {"start": None}}, "a mode is a motion without excitation"),
-    ({"sweep": {"stability": True}}, "sweep%stability = .true. does not go with"),
+    ({"sweep": {"stability": True}}, "sweep%stability = .true. does not go with a side 2 that slides"),
     ({"harmonics": {"parity": "odd"}}, "a moving side")])
 def test_refusals(tmp_path, change, message):
     groups = at(oracle("v4_rub_path")["groups"], 100.0)

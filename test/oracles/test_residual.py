@@ -190,6 +190,23 @@ def test_ends_of_a_wedge(tmp_path):
         assert np.abs(both[1] / high - 1.0).max() < 1e-6
 
 
+def test_a_sweep_moves_a_slider_from_0(tmp_path):
+    """Nothing else moves the face: each point is that of the case with its slider, at rest there by
+    (k_u + k) u = k s."""
+    k_u, k = 1.0, 0.5
+    groups = {
+        "model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 1.0], "stiffness": [k_u, 0.0, 0.0, 2.0],
+                  "damping": [0.04, 0.0, 0.0, 0.04]},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 2], "mu": 0.3, "gap": -0.1,
+                    "tangential_stiffness": k, "normal_stiffness": 1.0, "slider_1": 0.0},
+        "load": {"cosine": [0.0, 0.02]}, "harmonics": {"n_harmonics": 3},
+        "sweep": {"frequency": 0.9, "parameter": "contact%slider_1", "start": 0.0, "end": 0.02,
+                  "n_points": 3},
+        "output": {"observe": [1]}}
+    found = solved(tmp_path, groups)["coefficients"][:, 0, 0]
+    assert np.abs(found - k * np.array([0.0, 0.01, 0.02]) / (k_u + k)).max() < 1e-10
+
+
 def test_slider_parameter(tmp_path):
     """A pair that never slips follows its slider, a pair that slips forgets it."""
     groups = merged(slider(), {"contact": {"slider_1": 1e-4}})
