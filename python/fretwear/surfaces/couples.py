@@ -259,9 +259,10 @@ def _frames(normal: Floats, tangent: ArrayLike | None) -> Floats:
         start = np.broadcast_to(given / np.linalg.norm(given), normal.shape)
     first = start - np.einsum("ij,ij->i", start, normal)[:, None] * normal
     length = np.linalg.norm(first, axis=1)
-    if (length < 1e-6).any():
-        raise InputError(f"tangent = {tangent!r}; is along the normal of {int((length < 1e-6).sum())}"
-                         " pairs, must be across it")
+    n_along = int((length < 1e-6).sum())
+    if n_along:
+        raise InputError(f"tangent = {tangent!r}; is along the normal of {n_along} pairs, must be "
+                         "across it")
     first /= length[:, None]
     return np.stack((first, np.cross(normal, first), normal), axis=1)
 
