@@ -103,6 +103,7 @@ contains
       end associate
       if (.not. allocated(error)) call come_to_rest(self, still, error)
       if (.not. allocated(error)) call take_shape(self, case, error)
+      if (.not. allocated(error)) call keep_apart(self, case, error)
       if (allocated(error)) return
       ! The load that vibrates is over.
       self%structure%load(:, 2:) = 0.0_wp
@@ -215,19 +216,53 @@ contains
 
    end subroutine take_shape
 
+   !> A rigid pair cannot be released from behind its surface: the integration would take it for
+   !> open until it comes back. Elastic ones are pressed there.
+   subroutine keep_apart(self, case, error)
+      class(ringdown_analysis), intent(in) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: rest(self%structure%n_rows), way(self%structure%n_rows), share, least
+      integer :: i, r, first
+
+      rest = matmul(self%state%displacement, self%structure%rows)
+      way = matmul(self%shape, self%structure%rows)
+      least = 1.0_wp
+      first = 0
+      do i = 1, self%structure%n_pairs
+         r = self%structure%row(3, i)
+         if (r == 0) cycle
+         if (self%structure%compliance(r) > 0.0_wp) cycle
+         ! The rows of closed ones are round-off in the shape.
+         if (way(r) >= -node*maxval(abs(self%shape))) cycle
+         share = max(0.0_wp, rest(r) + self%structure%gap(i))/(-way(r))
+         if (share >= least) cycle
+         least = share
+         first = i
+      end do
+      if (first == 0) return
+      call fatal_error(error, '&ringdown amplitude = '//to_text(case%ringdown%amplitude)// &
+                       ': pair '//to_text(first)//', which is rigid and open at rest, would be '// &
+                       'released behind its surface: take at most '// &
+                       to_text(least*case%ringdown%amplitude)//", or law = 'penalty'", &
+                       status_input)
+   end subroutine keep_apart
+
    !> From one extreme to the next.
    subroutine measure_swings(group)
       type(ringdown_group), intent(inout) :: group
-      integer :: n
+      integer :: m, n
 
       n = size(group%extreme_time)
+      ! Fewer than none are an extent that the result cannot have.
+      m = max(0, n - 3)
       associate (at => group%extreme_time, value => group%extreme_value)
          group%amplitude = 0.5_wp*abs(value(:, 2:) - value(:, :n - 1))
          group%omega = pi/(at(2:) - at(:n - 1))
       end associate
       associate (a => group%amplitude)
          ! Of what does not swing any more there is none.
-         group%damping_ratio = log(a(1, :n - 3)/a(1, 3:))/(2.0_wp*pi)
+         group%damping_ratio = log(a(1, :m)/a(1, 3:m + 2))/(2.0_wp*pi)
       end associate
    end subroutine measure_swings
 

@@ -240,7 +240,13 @@ contains
 
       rate = maxval(state%rate)
       self%largest_rate = max(self%largest_rate, rate)
-      if (rate <= self%options%steady_tolerance*self%largest_rate .and. &
+      if (gains(state%rate, system%mean_pressure()) > 0) then
+         ! Neither a steady state nor a wear that goes on: the model of the sliding does not hold.
+         self%ending = 'pair '//to_text(gains(state%rate, system%mean_pressure()))//' would '// &
+                       'gain what it should lose: its vibration is faster than the surface '// &
+                       '(contact%speed_1, speed_2), which sliding = ''steady'' leaves out: '// &
+                       "take sliding = 'path'"
+      else if (rate <= self%options%steady_tolerance*self%largest_rate .and. &
           .not. (self%is_part .and. rate > 0.0_wp)) then
          self%steady = steady_reached
          self%complete = .true.
@@ -265,6 +271,19 @@ contains
                        ' steps done: raise wear%max_steps or the size of the steps'
       end if
    end subroutine judge
+
+   !> The pair that bears and whose depth falls fastest; 0 where none falls beyond what the rates of
+   !> a solution may be off. Friction that turns with the motion has no such pair, that of a side
+   !> that slides steadily has where the pressure is high while the pair runs ahead of the surface.
+   pure integer function gains(rate, pressure)
+      real(wp), intent(in) :: rate(:), pressure(:)
+
+      gains = 0
+      if (size(rate) == 0) return
+      gains = minloc(rate, dim=1, mask=pressure > bears*maxval(pressure))
+      if (gains == 0) return
+      if (rate(gains) >= -wears*maxval(abs(rate))) gains = 0
+   end function gains
 
    !> See the module header. Looked for at every doubling of the depth.
    logical function in_gross_slip(self, system, state) result(found)

@@ -173,3 +173,41 @@ def test_refused(tmp_path, changes, words):
                         if value is not None}
     done = run(tmp_path, groups, status=3 if words else 0)
     assert words is None or words in done.stderr
+
+
+def stop(law, side, amplitude=0.4):
+    """A mass on a spring, 0.5 before a stop: in front of it (side -1) or behind it (side 1)."""
+    groups = {"case": {"analysis": "ringdown"},
+              "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.01},
+              "contact": {"n_pairs": 1, "law": law, "side_1": [0, 0, side], "mu": 0.0, "gap": 0.5},
+              "ringdown": {"amplitude": amplitude, "n_cycles": 3}}
+    if law == "penalty":
+        groups["contact"] |= {"normal_stiffness": 50.0, "tangential_stiffness": 1.0}
+    return groups
+
+
+@pytest.mark.parametrize("law", ("dlft", "dlft_velocity", "rigid", "penalty"))
+def test_nothing_is_released_behind_a_rigid_surface(tmp_path, law):
+    if law == "penalty":
+        run(tmp_path, stop(law, -1, 1.0))
+    else:
+        told = run(tmp_path, stop(law, -1, 1.0), status=3).stderr
+        for words in ("&ringdown amplitude = 1", "pair 1", "take at most 0.5", "'penalty'"):
+            assert words in told
+        # As far as the surface itself.
+        run(tmp_path, stop(law, -1, 0.4999999))
+    # Away from it, the mass meets it on its way.
+    run(tmp_path, stop(law, 1, 1.0))
+    lowest = read(tmp_path / "case.h5")["ringdown/observed"].min()
+    assert lowest == pytest.approx(-0.5, abs=1e-3) or (law == "penalty" and lowest < -0.5)
+
+
+@pytest.mark.parametrize(("n_cycles", "swings"), [(1, 1), (2, 3), (3, 5)])
+def test_few_cycles(tmp_path, n_cycles, swings):
+    """One cycle ends before its second turn: no damping ratio, and a result all the same."""
+    groups = stop("penalty", -1)
+    groups["ringdown"]["n_cycles"] = n_cycles
+    run(tmp_path, groups)
+    found = read(tmp_path / "case.h5")
+    assert found["ringdown/omega"].shape == (swings,)
+    assert found["ringdown/damping_ratio"] == pytest.approx([0.005] * max(0, swings - 2), rel=1e-4)

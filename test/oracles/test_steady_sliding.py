@@ -237,6 +237,46 @@ def test_remark_where_sliding_may_turn(tmp_path, law):
         assert "sliding may turn" not in remarks(tmp_path / "case.h5")
 
 
+def ahead(n_pairs, ahead_of, speed=0.05):
+    """Masses on springs, each with a tangential and a normal dof: the first is pressed most while it
+    runs with the surface (ahead_of = 1) or against it (-1), twenty times as fast."""
+    n = 2 * n_pairs
+    cosine, sine = np.zeros((n_pairs, 2)), np.zeros((n_pairs, 2))
+    cosine[:, 0] = [1.0] + [0.01] * (n_pairs - 1)
+    sine[:, 1] = 0.9 * ahead_of
+    return {"case": {"analysis": "wear"},
+            "model": {"n_dof": n, "mass": 1e-3 * np.eye(n).ravel(), "stiffness": np.eye(n).ravel(),
+                      "damping": 0.01 * np.eye(n).ravel()},
+            "contact": {"n_pairs": n_pairs, "law": "penalty", "mu": 0.1, "area": 1.0,
+                        "side_1": [k for i in range(n_pairs) for k in (2 * i + 1, 0, 2 * i + 2)],
+                        "tangential_stiffness": 1.0, "normal_stiffness": 1.0,
+                        "sliding": "steady", "speed_1": [speed] * n_pairs},
+            "load": {"static": [0.0, -1.0] * n_pairs, "cosine": cosine.ravel(),
+                     "sine": sine.ravel()},
+            "harmonics": {"n_harmonics": 3, "n_time": 256}, "sweep": {"start": 1.0},
+            "wear": {"coefficient": 1e-3, "n_cycles": 100}}
+
+
+@pytest.mark.parametrize("n_pairs", (1, 2))
+def test_a_depth_that_falls_is_no_steady_state(tmp_path, n_pairs):
+    """What slides by S < 0 would grow: said, and neither a steady state nor an end that was
+    reached."""
+    groups = ahead(n_pairs, 1.0)
+    run(tmp_path, groups, status=4)
+    found = read(tmp_path / "case.h5")
+    wanted = slides(found, 0, groups)
+    assert wanted[0] < 0.0 and all(other > 0.0 for other in wanted[1:])
+    assert found["wear/rate"][0, 0] < 0.0 and len(found["wear/cycles"]) == 1
+    assert found["wear"]["ending"].startswith("pair 1 would gain")
+    assert found["wear"]["steady_state"] == "not reached"
+    run(tmp_path, ahead(n_pairs, -1.0))
+    found = read(tmp_path / "case.h5")
+    assert (np.diff(found["wear/depth"], axis=0) > 0.0).all()
+    groups["contact"]["sliding"] = "path"
+    run(tmp_path, groups)
+    assert (read(tmp_path / "case.h5")["wear/rate"] > 0.0).all()
+
+
 def test_no_remark_of_a_pair_that_never_touches(tmp_path):
     groups = steady("penalty", gap=[1.0, 1.0], speed_1=[1e-4] * 2, speed_2=[0.0] * 2)
     run(tmp_path, groups)
