@@ -7,7 +7,6 @@ module fw_run_bounds
    use fw_bounds_group, only: bounds_group
    use fw_case, only: case_type
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_moved_parameter, only: moved_parameter
