@@ -272,6 +272,8 @@ contains
             do c = 1, 2
                if (p%order_of(i, c) > 0) cycle
                call elongation(self, state, i, c, input(:, c))
+               ! Laws of hysteresis have no start of their own, and absent directions no stiffness.
+               if (.not. (allocated(self%work%x_start) .and. p%stiffness(i, c) > 0.0_wp)) cycle
                input(1, c) = input(1, c) - self%work%x_start(i, c)/p%stiffness(i, c)
             end do
          case (slider_1, slider_2)
