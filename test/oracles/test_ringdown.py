@@ -14,7 +14,7 @@ from scipy.special import ellipk
 
 REFERENCE = json.loads((ROOT / "test/reference/blades/b9_ringdown.json").read_text())
 #: Steps of a period: those of the program, and of the judge, whose scheme is of second order too.
-STEPS, FINER = 2000, 8000
+STEPS, FINER = 2000, 4000
 #: Both miss the moments of stick, slip and contact by a part of a step: measured 4e-6 to 1.5e-4.
 EQUAL = 1.5e-3
 #: The linear decay: swings against exp(-zeta omega t), by the square of a step.
