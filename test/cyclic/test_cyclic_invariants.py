@@ -11,9 +11,10 @@ from nodal_file import tied, write_nodal_file
 #: Solutions of the same equations, which are formed in another order: round-off of 1e-16 times the
 #: condition of these sectors, below 1e3 (measured 5e-15 at most with three kernels of OpenBLAS).
 SAME = 1e-12
-#: Amplitudes of a cycle are of differences of its stress, static part included: what rows add up
-#: loses (measured 8e-12).
-STRESS = 1e-10
+#: Of stress, what rows add up loses a factor of 100. The mean is taken at the two instants that are
+#: furthest apart, which a flat maximum fixes to the root of round-off alone (measured 8e-12, and
+#: 8e-10 with another kernel of OpenBLAS).
+STRESS = {"coefficients": 1e-10, "amplitude": 1e-10, "mean": 1e-7}
 #: Work of the load against what is dissipated: residuals of 1e-12 times quotients of both.
 BALANCE = 1e-10
 OMEGAS = [0.8, 1.7]
@@ -151,8 +152,8 @@ def test_stress_of_nodal_diameters(tmp_path, phase):
                           "sweep": {"values": OMEGAS}, "solver": {"tolerance": TIGHT}})
         found.append(read(path.parent / "case.h5"))
     assert np.abs(found[1]["stress/coefficients"]).max() > 0.1
-    for name in ("stress/coefficients", "stress/amplitude", "stress/mean"):
-        assert difference(found[0][name], found[1][name]) < STRESS
+    for name, limit in STRESS.items():
+        assert difference(found[0][f"stress/{name}"], found[1][f"stress/{name}"]) < limit
     del diameters[1]["stress/matrix"]
     write_nodal_file(tmp_path / "model.h5", case["n_sectors"], len(kept), diameters,
                      contact=contact)
