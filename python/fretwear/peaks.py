@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import AbsentError
 from .result_file import ResultFile, plain_text
 
 __all__ = ["Peak", "read_peaks"]
@@ -53,6 +54,9 @@ class Peak:
 
 def read_peaks(result: ResultFile) -> tuple[Peak, ...]:
     """Every maximum in a result; raises AbsentError where the run looked for none."""
+    if "peak/omega" not in result and not np.any(result["amplitude"]):
+        raise AbsentError(f"{result.name}: has no peak: what is observed stays at rest at every "
+                          "point; observe another dof (output%observe), or load it more")
     omega = result["peak/omega"]
     names = result["observed/name"]
     with result.open() as file:

@@ -3,6 +3,8 @@ import numpy as np
 import scipy.linalg
 
 KINDS = ("frf", "control", "mode", "resonance", "sensitivity", "control branch", "wear", "optimum")
+#: Those of seeds from FIRST_LATER on.
+LATER, FIRST_LATER = ("residual", "slider", "bounds", "several", "rub", "ringdown"), 96
 LAWS = ("penalty", "dlft", "rigid", "regularised", "dlft_velocity")
 
 
@@ -41,6 +43,15 @@ def drawn_contact(random, n, law, normal):
     if law == "regularised" and rubs:
         contact["slip_speed"] = float(random.uniform(0.01, 0.2))
     return contact
+
+
+def rub_along_one(contact, random, n):
+    """One tangential direction, on a dof that is not the normal one."""
+    along = int(random.choice([dof + 1 for dof in range(n) if dof + 1 != contact["side_1"][2]]))
+    contact["side_1"] = [along, 0, contact["side_1"][2]]
+    contact["mu"] = float(random.uniform(0.2, 1.0))
+    if contact["law"] == "penalty":
+        contact["tangential_stiffness"] = float(random.uniform(0.3, 3.0))
 
 
 def asks(random, kind, groups, modes):
@@ -91,16 +102,50 @@ def asks(random, kind, groups, modes):
         groups["sweep"] = sweep
 
 
+def asks_later(random, kind, groups, modes):
+    """The same of the later kinds."""
+    low, high = float(0.7 * modes[0]), float(1.3 * modes[min(len(modes), 2) - 1])
+    contact = groups["contact"]
+    groups["sweep"] = {"start": low, "end": high, "n_points": 5}
+    if kind in ("residual", "bounds"):
+        contact["memory"] = "residual"
+    if kind == "residual":
+        contact["residual"] = float(random.uniform(-1.0, 1.0))
+    elif kind == "slider":
+        contact["slider_1"] = float(random.uniform(-0.5, 0.5))
+        groups["sensitivity"] = {"parameters": ["contact%slider_1", "contact%mu"]}
+    elif kind == "bounds":
+        groups["case"]["analysis"] = "bounds"
+        groups["bounds"] = {"quantity": str(random.choice(["first_harmonic", "largest"]))}
+    elif kind == "several":
+        groups["case"]["analysis"] = "point"
+        groups["solver"]["n_solutions"] = 3
+        groups["sweep"] = {"start": float(random.uniform(low, high))}
+    elif kind == "rub":
+        contact["speed_1"] = float(random.choice([-1.0, 1.0]) * random.uniform(0.1, 3.0))
+        contact["sliding"] = str(random.choice(["path", "steady"]))
+        if contact["side_1"][2]:
+            contact |= {"n_gap_terms": 1, "gap_harmonic": int(random.integers(1, 4)),
+                        "gap_amplitude": float(random.uniform(-0.3, 0.3)), "gap_phase": 40.0}
+    elif kind == "ringdown":
+        groups["case"]["analysis"] = "ringdown"
+        groups["ringdown"] = {"amplitude": float(random.uniform(0.1, 2.0)), "n_cycles": 4,
+                              "steps_per_period": 200}
+        del groups["load"]["cosine"], groups["sweep"]
+
+
 def drawn(seed):
     """Kind and groups of a case."""
     random = np.random.default_rng(seed)
-    kind = KINDS[seed % len(KINDS)]
-    law = str(random.choice(LAWS))
+    kind = (KINDS[seed % len(KINDS)] if seed < FIRST_LATER
+            else LATER[(seed - FIRST_LATER) % len(LATER)])
+    law = str(random.choice(LAWS if seed < FIRST_LATER else ("penalty", "dlft")))
     if kind == "mode" and law == "regularised":
         law = "dlft"
     if kind in ("wear", "resonance", "optimum", "sensitivity") and law == "regularised":
         law = "penalty"
-    normal = (bool(random.random() < 0.4) and law != "dlft_velocity") or kind == "wear"
+    normal = ((bool(random.random() < 0.4) and law != "dlft_velocity")
+              or kind in ("wear", "residual", "bounds", "several"))
     n = int(random.integers(1 + normal, 5))
     model = drawn_model(random, n)
     modes = np.sqrt(scipy.linalg.eigvalsh(model["stiffness"].reshape(n, n),
@@ -111,13 +156,15 @@ def drawn(seed):
               "harmonics": {"n_harmonics": int(random.choice([3, 5])), "parity": "auto"},
               "solver": {"tolerance": 1e-10},
               "output": {"observe": int(random.integers(1, n + 1))}}
-    if random.random() < 0.8 or kind in ("wear", "optimum"):
+    if random.random() < 0.8 or kind in ("wear", "optimum", *LATER):
         groups["contact"] = drawn_contact(random, n, law, normal)
+        if kind in ("residual", "bounds", "slider", "rub"):
+            rub_along_one(groups["contact"], random, n)
         if normal and random.random() < 0.5:
             static[groups["contact"]["side_1"][2] - 1] = -float(random.uniform(0.2, 1.0))
     else:
         groups["spring"] = {"n_springs": 1, "side_1": int(random.integers(1, n + 1)),
                             "coefficient": float(random.uniform(-0.1, 1.0))}
     groups["load"] = {"cosine": cosine, "static": static}
-    asks(random, kind, groups, modes)
+    (asks if seed < FIRST_LATER else asks_later)(random, kind, groups, modes)
     return kind, groups

@@ -13,8 +13,9 @@ TITLE = "Units"
 TEXT = """
 Chains of one to four masses with a pair of every law, in one or two tangential directions, with and
 without a normal dof, gap and static load, or with a cubic spring: responses, given amplitudes
-(natural and by arc length), modes, resonances over a parameter, wear, derivatives, and optima
-(`fretwear.optimise`). Each case is run as it is, and with force, length and time in other units,
+(natural and by arc length), modes, resonances over a parameter, wear, derivatives, optima
+(`fretwear.optimise`), residual tractions, their ranges, sliders, several solutions, obstacles that
+move and free decay. Each case is run as it is, and with force, length and time in other units,
 one after the other and all together: factors that are even powers of two, which change no digit of
 the input.
 
@@ -26,8 +27,8 @@ millionth, and to 1e-2 branches, where the places of points are what round-off m
 and differ, *other rows* those that are not as many. Optima are those of the Python package of
 today, whatever program is counted beside it.
 """
-COUNT = 96
-SMALL = (0, 1, 2, 3, 4, 5, 6, 8, 9, 10)
+COUNT = 192
+SMALL = (0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 96, 97, 98, 99, 100, 101)
 COLUMNS = {"runs": "runs in other units", "same": "the same", "in_words": "of these in words",
            "words": "other words", "rows": "other rows", "numbers": "other numbers"}
 ZERO = ("words", "rows", "numbers")
@@ -42,6 +43,8 @@ SAME, SAME_DIRECTION, SAME_BRANCH = 1e-9, 3e-6, 1e-2
 SAME_CORNER = 1e-5
 #: Of a case as it is drawn, where all is of the order of one, what is less is none.
 ROUND_OFF = 1e-6
+#: The same of derivatives, which are sums of many parts that may cancel.
+NO_SLOPE = 1e-3
 #: Exponents of force, length and time of the keys that are drawn.
 NONE, FORCE, LENGTH, STIFFNESS, FREQUENCY = (0, 0, 0), (1, 0, 0), (0, 1, 0), (1, -1, 0), (0, 0, -1)
 KEYS = {"mass": (1, -1, 2), "stiffness": STIFFNESS, "damping": (1, -1, 1), "cosine": FORCE,
@@ -50,10 +53,13 @@ KEYS = {"mass": (1, -1, 2), "stiffness": STIFFNESS, "damping": (1, -1, 1), "cosi
         "area": (0, 2, 0), "sweep.start": FREQUENCY, "sweep.end": FREQUENCY,
         "sweep.frequency": FREQUENCY, "values": FREQUENCY, "amplitude": LENGTH,
         "mode.start": LENGTH, "mode.end": LENGTH, "wear.coefficient": (-1, 2, 0),
-        "spring.coefficient": (1, -3, 0)}
+        "spring.coefficient": (1, -3, 0), "slider_1": LENGTH, "gap_amplitude": LENGTH,
+        "speed_1": (0, 1, -1)}
 #: Those of the datasets; the first that matches. `None`: not compared.
 MODAL = (0.5, 0.5, 1.0)
 DATASETS = (
+    (r"bounds/(lowest|highest|centre)", LENGTH), (r"bounds/", NONE), (r"obstacle_work", (1, 1, 0)),
+    (r"ringdown/(extreme/)?time", (0, 0, 1)), (r"ringdown/(observed|extreme/value)", LENGTH),
     (r"seconds|iterations|residual|_by$|/error|observed|restart/|/kind|/pair$", None),
     (r"(^|_|/)omega$|self_excitation|bandwidth", FREQUENCY), (r"^wear/rate", LENGTH),
     (r"(^|/)contact/area", (0, 2, 0)), (r"volume", (0, 3, 0)), (r"curvature", (0, 1, 2)),
@@ -151,15 +157,15 @@ def all_dims(name):
     return dims_of(name)
 
 
-def difference(now, before, scale):
-    """Largest difference of two datasets over the largest number of the one before."""
+def difference(now, before, scale, none):
+    """Largest difference of two datasets over the largest number of the one before, or `none`."""
     now, before = (np.atleast_1d(np.asarray(data, float)) for data in (now, before))
     if (np.isfinite(now) != np.isfinite(before)).any():
         return np.inf
     good = np.isfinite(before)
     if not good.any():
         return 0.0  # also where nothing converged
-    largest = max(np.abs(before[good]).max(), ROUND_OFF)
+    largest = max(np.abs(before[good]).max(), none)
     # NumPy must not underflow what the program has not.
     return float(np.abs(now[good] / scale - before[good]).max() / largest)
 
@@ -182,7 +188,8 @@ def compared(one, other, units, same=SAME):
             return "rows", f"{name}: {np.shape(before)}, {np.shape(now)}"
         if len(np.atleast_1d(before)) == len(good):
             now, before = np.atleast_1d(now)[good], np.atleast_1d(before)[good]
-        error = difference(now, before, factor(dims, units))
+        error = difference(now, before, factor(dims, units),
+                           NO_SLOPE if name.startswith("sensitivity/") else ROUND_OFF)
         if name.startswith("tangent") or "curvature" in name:
             error *= min(1.0, same / SAME_DIRECTION)
         if error > worst:
