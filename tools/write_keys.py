@@ -57,30 +57,84 @@ def declared(program: str) -> Keys:
     return json.loads(shown.stdout)
 
 
+#: What to do instead of a feature wherever nothing else is said; said once, above the table.
+REMEDIES = {"harmonics%accuracy": "give n_harmonics", "output%tail": "take more n_harmonics",
+            "contact%memory = 'carried'": "use 'assembly'",
+            "sweep%continuation = 'arclength'": "use 'natural'",
+            "solver%kind = 'pseudo_time'": "use 'newton'",
+            "case%analysis = 'time' or 'ringdown'": "use 'frf' or 'point'",
+            "a case without a vibratory load": "set load%cosine or load%sine",
+            "a case without a load in harmonic 1": "set load%cosine or load%sine"}
+
+
 def rules(program: str) -> str:
-    """What does not go together as Markdown; one row for each asker and remedy."""
+    """What does not go together as Markdown: a row for each asker, what it needs and forbids."""
     shown = subprocess.run([program, "--rules"], check=True, capture_output=True, text=True)
-    rows: dict[str, dict[str, list[str]]] = {}
+    needs: dict[str, list[str]] = {}
+    refuses: dict[str, dict[str, list[str]]] = {}
     for line in shown.stdout.splitlines():
         asks, rest = line.split(" does not go with ", 1)
         forbids, remedy = rest.split(": ", 1)
-        rows.setdefault(asks, {}).setdefault(remedy, []).append(forbids)
-    lines = ["| what | does not go with | instead |", "|---|---|---|"]
-    for asks, remedies in rows.items():
-        lines += [f"| {quoted(asks)} | {'; '.join(map(quoted, forbids))} | {coded(remedy)} |"
-                  for remedy, forbids in remedies.items()]
+        needs.setdefault(asks, [])
+        others = refuses.setdefault(asks, {})
+        known = remedy == REMEDIES.get(forbids)
+        remedy = action(remedy)
+        known = known or not remedy
+        if found := re.fullmatch(r"(\S+) other than (.*)", forbids):
+            # "use" of what is needed says nothing more.
+            plain = known or remedy in (f"use {found[2]}", f"set memory = {found[2]}")
+            said = quoted(f"{found[1]} = {found[2]}")
+            needs[asks].append(said if plain else f"{said}: {quoted(remedy)}")
+        elif found := re.fullmatch(r"a (?:case|law|pair) without (.*)", forbids):
+            said = quoted(found[1])
+            needs[asks].append(said if known else f"{said}: {quoted(remedy)}")
+        else:
+            others.setdefault("" if known else remedy, []).append(forbids)
+    common = [f"* {quoted(name)}: {quoted(remedy)}" for name, remedy in REMEDIES.items()]
+    lines = ["A remedy stands behind a colon. Without one, leave one of the two out; of these:",
+             "", *common, "", "| what | needs | does not go with |", "|---|---|---|"]
+    for asks, remedies in refuses.items():
+        cells = [", ".join(map(quoted, forbids)) + (f": {quoted(remedy)}" if remedy else "")
+                 for remedy, forbids in remedies.items()]
+        lines.append(f"| {quoted(asks)} | {'; '.join(needs[asks])} | {'; '.join(cells)} |")
     return "\n".join(lines)
+
+
+def action(remedy: str) -> str:
+    """What to do, without the reason that the program gives; empty where it is to leave out."""
+    last = re.split("[;:] ", remedy)[-1]
+    if re.fullmatch("leave (it|them|stability|the speeds) out", last):
+        return ""
+    told = re.match("(use|give|leave|take|set|sweep|run|follow) ", last) and "this" not in last
+    return last if told else remedy
 
 
 def parts(program: str) -> str:
-    """What a model file may hold, as Markdown."""
+    """What a model file may hold, as Markdown; one row for parts that differ in their name alone.
+
+    Kinds are said where they are not real, `[pair]` is one value each or one for all.
+    """
     shown = subprocess.run([program, "--parts"], check=True, capture_output=True, text=True)
     code = re.compile(r"\w+%\w+|&\w+|(?<!\w)/\w+(?:/\w+)*|'[^']+'|coefficient \* \w+\*\*power")
-    lines = shown.stdout.splitlines()
-    for k, line in enumerate(lines[2:], 2):
-        start, meaning = line.rsplit(" | ", 1)
-        lines[k] = f"{start} | {code.sub(lambda found: f'`{found[0]}`', meaning)}"
-    return "\n".join(lines)
+    rows: list[tuple[str, str, str]] = []
+    for line in shown.stdout.splitlines()[2:]:
+        name, kind, shape, required, text = line.removeprefix("| ").removesuffix(" |").split(" | ")
+        shape = re.sub(r"\((\w+)\) or scalar", r"[\1]", shape.strip())
+        shape = shape if kind == "real" else f"{kind} {shape}".strip()
+        text = code.sub(lambda found: f"`{found[0]}`", text)
+        if required := required.strip():
+            path = name.split("`")[1]
+            group = path if " attribute " in name else path.rsplit("/", 1)[0]
+            own = required in ("required", "with its group", f"with {group}")
+            text = f"{'required' if own else required}: {text}"
+        last = rows[-1] if rows else ("", "", "")
+        if shape == last[1] and text in ("likewise", "the same along t2"):
+            text = last[2] if text == "likewise" else last[2].replace("along t1", "along t1, t2")
+            rows[-1] = (f"{last[0]}, `{name.strip('`').rsplit('/', 1)[1]}`", shape, text)
+        else:
+            rows.append((name, shape, text))
+    return "\n".join(["| name | shape | meaning |", "|---|---|---|",
+                      *(f"| {name} | {shape} | {text} |" for name, shape, text in rows)])
 
 
 def said(program: str, option: str) -> str:
@@ -98,7 +152,8 @@ def said(program: str, option: str) -> str:
 
 def quoted(feature: str) -> str:
     """A feature with its key as code, and what it says of it as text."""
-    return re.sub(r"\b\w+%\w+(?: = (?:'[^']*'|\.true\.|\d+))?|&\w+|'[^']+'", r"`\g<0>`", feature)
+    return re.sub(r"\b\w+%\w+(?: = (?:'[^']*'|\.true\.|\d+))?|&\w+|/\w+/\w+|'[^']+'|"
+                  r"\b\w+_\w+\b", r"`\g<0>`", feature)
 
 
 def number(value: float) -> str:
