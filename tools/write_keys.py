@@ -59,30 +59,72 @@ def declared(program: str) -> Keys:
     return json.loads(shown.stdout)
 
 
+#: What to do instead of a feature wherever nothing else is said; said once, above the table.
+REMEDIES = {"harmonics%accuracy": "give n_harmonics", "output%tail": "take more n_harmonics",
+            "contact%memory = 'carried'": "use 'assembly'",
+            "sweep%continuation = 'arclength'": "use 'natural'",
+            "solver%kind = 'pseudo_time'": "use 'newton'",
+            "case%analysis = 'time' or 'ringdown'": "use 'frf' or 'point'",
+            "a case without a vibratory load": "set load%cosine or load%sine",
+            "a case without a load in harmonic 1": "set load%cosine or load%sine"}
+
+
 def rules(program: str) -> str:
-    """What does not go together as Markdown; one row for each asker and remedy."""
+    """What does not go together as Markdown: a row for each asker, what it needs and forbids."""
     shown = subprocess.run([program, "--rules"], check=True, capture_output=True, text=True)
-    rows: dict[str, dict[str, list[str]]] = {}
+    needs: dict[str, list[str]] = {}
+    refuses: dict[str, dict[str, list[str]]] = {}
     for line in shown.stdout.splitlines():
         asks, rest = line.split(" does not go with ", 1)
         forbids, remedy = rest.split(": ", 1)
-        rows.setdefault(asks, {}).setdefault(remedy, []).append(forbids)
-    lines = ["| what | does not go with | instead |", "|---|---|---|"]
-    for asks, remedies in rows.items():
-        lines += [f"| {quoted(asks)} | {'; '.join(map(quoted, forbids))} | {coded(remedy)} |"
-                  for remedy, forbids in remedies.items()]
+        needs.setdefault(asks, [])
+        others = refuses.setdefault(asks, {})
+        known = remedy in ("leave it out", REMEDIES.get(forbids))
+        if found := re.fullmatch(r"(\S+) other than (.*)", forbids):
+            # "use" of what is needed says nothing more.
+            plain = known or remedy in (f"use {found[2]}", f"set memory = {found[2]}")
+            said = quoted(f"{found[1]} = {found[2]}")
+            needs[asks].append(said if plain else f"{said}: {coded(remedy)}")
+        elif found := re.fullmatch(r"a (?:case|law|pair) without (.*)", forbids):
+            said = quoted(found[1])
+            needs[asks].append(said if known else f"{said}: {coded(remedy)}")
+        else:
+            others.setdefault("" if known else remedy, []).append(forbids)
+    common = [f"* {quoted(name)}: {coded(remedy)}" for name, remedy in REMEDIES.items()]
+    lines = ["A remedy stands behind a colon. Without one, leave the feature out, but of these:",
+             "", *common, "", "| what | needs | does not go with |", "|---|---|---|"]
+    for asks, remedies in refuses.items():
+        cells = [", ".join(map(quoted, forbids)) + (f": {coded(remedy)}" if remedy else "")
+                 for remedy, forbids in remedies.items()]
+        lines.append(f"| {quoted(asks)} | {'; '.join(needs[asks])} | {'; '.join(cells)} |")
     return "\n".join(lines)
 
 
 def parts(program: str) -> str:
-    """What a model file may hold, as Markdown."""
+    """What a model file may hold, as Markdown; one row for parts that differ in their name alone.
+
+    Kinds are said where they are not real, `[pair]` is one value each or one for all.
+    """
     shown = subprocess.run([program, "--parts"], check=True, capture_output=True, text=True)
     code = re.compile(r"\w+%\w+|&\w+|(?<!\w)/\w+(?:/\w+)*|'[^']+'|coefficient \* \w+\*\*power")
-    lines = shown.stdout.splitlines()
-    for k, line in enumerate(lines[2:], 2):
-        start, meaning = line.rsplit(" | ", 1)
-        lines[k] = f"{start} | {code.sub(lambda found: f'`{found[0]}`', meaning)}"
-    return "\n".join(lines)
+    rows: list[tuple[str, str, str]] = []
+    for line in shown.stdout.splitlines()[2:]:
+        name, kind, shape, required, text = line.removeprefix("| ").removesuffix(" |").split(" | ")
+        shape = re.sub(r"\((\w+)\) or scalar", r"[\1]", shape.strip())
+        shape = shape if kind == "real" else f"{kind} {shape}".strip()
+        text = code.sub(lambda found: f"`{found[0]}`", text)
+        if required := required.strip():
+            group = name.split("`")[1] if " attribute " in name else name.strip("`").rsplit("/", 1)[0]
+            own = required in ("required", "with its group", f"with {group}")
+            text = f"{'required' if own else required}: {text}"
+        last = rows[-1] if rows else ("", "", "")
+        if shape == last[1] and text in ("likewise", "the same along t2"):
+            text = last[2] if text == "likewise" else last[2].replace("along t1", "along t1, t2")
+            rows[-1] = (f"{last[0]}, `{name.strip('`').rsplit('/', 1)[1]}`", shape, text)
+        else:
+            rows.append((name, shape, text))
+    return "\n".join(["| name | shape | meaning |", "|---|---|---|",
+                      *(f"| {name} | {shape} | {text} |" for name, shape, text in rows)])
 
 
 def said(program: str, option: str) -> str:
