@@ -79,25 +79,36 @@ def rules(program: str) -> str:
         forbids, remedy = rest.split(": ", 1)
         needs.setdefault(asks, [])
         others = refuses.setdefault(asks, {})
-        known = remedy in ("leave it out", REMEDIES.get(forbids))
+        known = remedy == REMEDIES.get(forbids)
+        remedy = action(remedy)
+        known = known or not remedy
         if found := re.fullmatch(r"(\S+) other than (.*)", forbids):
             # "use" of what is needed says nothing more.
             plain = known or remedy in (f"use {found[2]}", f"set memory = {found[2]}")
             said = quoted(f"{found[1]} = {found[2]}")
-            needs[asks].append(said if plain else f"{said}: {coded(remedy)}")
+            needs[asks].append(said if plain else f"{said}: {quoted(remedy)}")
         elif found := re.fullmatch(r"a (?:case|law|pair) without (.*)", forbids):
             said = quoted(found[1])
-            needs[asks].append(said if known else f"{said}: {coded(remedy)}")
+            needs[asks].append(said if known else f"{said}: {quoted(remedy)}")
         else:
             others.setdefault("" if known else remedy, []).append(forbids)
-    common = [f"* {quoted(name)}: {coded(remedy)}" for name, remedy in REMEDIES.items()]
-    lines = ["A remedy stands behind a colon. Without one, leave the feature out, but of these:",
+    common = [f"* {quoted(name)}: {quoted(remedy)}" for name, remedy in REMEDIES.items()]
+    lines = ["A remedy stands behind a colon. Without one, leave one of the two out; of these:",
              "", *common, "", "| what | needs | does not go with |", "|---|---|---|"]
     for asks, remedies in refuses.items():
-        cells = [", ".join(map(quoted, forbids)) + (f": {coded(remedy)}" if remedy else "")
+        cells = [", ".join(map(quoted, forbids)) + (f": {quoted(remedy)}" if remedy else "")
                  for remedy, forbids in remedies.items()]
         lines.append(f"| {quoted(asks)} | {'; '.join(needs[asks])} | {'; '.join(cells)} |")
     return "\n".join(lines)
+
+
+def action(remedy: str) -> str:
+    """What to do, without the reason that the program gives; empty where it is to leave out."""
+    last = re.split("[;:] ", remedy)[-1]
+    if re.fullmatch("leave (it|them|stability|the speeds) out", last):
+        return ""
+    told = re.match("(use|give|leave|take|set|sweep|run|follow) ", last) and "this" not in last
+    return last if told else remedy
 
 
 def parts(program: str) -> str:
@@ -114,7 +125,8 @@ def parts(program: str) -> str:
         shape = shape if kind == "real" else f"{kind} {shape}".strip()
         text = code.sub(lambda found: f"`{found[0]}`", text)
         if required := required.strip():
-            group = name.split("`")[1] if " attribute " in name else name.strip("`").rsplit("/", 1)[0]
+            path = name.split("`")[1]
+            group = path if " attribute " in name else path.rsplit("/", 1)[0]
             own = required in ("required", "with its group", f"with {group}")
             text = f"{'required' if own else required}: {text}"
         last = rows[-1] if rows else ("", "", "")
@@ -142,7 +154,8 @@ def said(program: str, option: str) -> str:
 
 def quoted(feature: str) -> str:
     """A feature with its key as code, and what it says of it as text."""
-    return re.sub(r"\b\w+%\w+(?: = (?:'[^']*'|\.true\.|\d+))?|&\w+|'[^']+'", r"`\g<0>`", feature)
+    return re.sub(r"\b\w+%\w+(?: = (?:'[^']*'|\.true\.|\d+))?|&\w+|/\w+/\w+|'[^']+'|"
+                  r"\b\w+_\w+\b", r"`\g<0>`", feature)
 
 
 def number(value: float) -> str:
