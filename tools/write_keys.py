@@ -49,6 +49,8 @@ from numpy.typing import ArrayLike
 CLASSES = {"case": "CaseGroup", "model": "Structure"}
 #: What the package gives by itself.
 OWN_WORDS = {"source": ["memory"]}
+#: What a whole group is for, as its heading says and rows do not repeat.
+GROUP_ONLY = {"mistuning": "cyclic%mistuned = .true.", "mission": "analysis = 'wear'"}
 
 
 def declared(program: str) -> Keys:
@@ -175,18 +177,18 @@ def accepts(key: dict[str, Any]) -> str:
     kind = key["type"]
     if kind == "word":
         words = ", ".join(f"`'{word}'`" for word in key["words"])
-        return f"{words}; one or {key['shape']}" if "shape" in key else words
+        return f"{words}; [{key['shape']}]" if "shape" in key else words
     if kind in ("text", "list"):
         return "text" if kind == "text" else coded(key["accepts"])
     if kind == "logical":
-        return "`.true.`, `.false.`"
+        return "logical"
     if key.get("whole"):
         kind = "whole number"
     text = f"{kind}s" if "shape" in key else kind
     if bounds := range_text(key):
         text = bounds if "shape" not in key else f"{text} {bounds}"
     if "shape" in key and key["shape"] != ":":
-        text += f", one or {key['shape']}" if key["repeats"] else f", {key['shape']}"
+        text += f" [{key['shape']}]" if key["repeats"] else f" ({key['shape']})"
     return text
 
 
@@ -195,7 +197,7 @@ def default(key: dict[str, Any]) -> str:
     parts = [coded(key["absent"])] if "absent" in key else []
     if "default" in key:
         parts.append(f"`{key['default']}`")
-    return ", else ".join(parts)
+    return re.sub("^of the file", "file", ", else ".join(parts))
 
 
 def coded(text: str) -> str:
@@ -203,33 +205,32 @@ def coded(text: str) -> str:
     return re.sub(r"\w+ = '[^' ]+'|'[^' ]+'|/\w+/\w+|\w+/\w+_\w+|\b\w+_\w+\b", r"`\g<0>`", text)
 
 
-def meaning(key: dict[str, Any]) -> str:
+def meaning(key: dict[str, Any], group: str) -> str:
+    """Unit, help and where the key acts, where that is not the whole group."""
     text = coded(key["help"])
-    return f"{text}; only: {coded(key['only'])}" if "only" in key else text
+    if "unit" in key:
+        text = ("`unit`: " if key["unit"] == "unit" else f"[{key['unit']}] ") + text
+    own = GROUP_ONLY.get(group, f"analysis = '{group}'")
+    only = key.get("only", "").removeprefix(own).removeprefix(", ")
+    return f"{text}; only: {coded(only)}" if only else text
 
 
-def table(keys: Keys) -> str:
-    """The keys of a group as Markdown; a column for units where there are any."""
-    columns = ["key", "unit", "default", "accepts", "meaning"]
-    if not any("unit" in key for key in keys.values()):
-        columns.remove("unit")
-    lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
+def table(group: str, keys: dict[str, Any], parameters: str) -> str:
+    """The keys of a group as Markdown; the long list of parameters stands in one of them."""
+    lines = ["| key | default | accepts | meaning |", "|---|---|---|---|"]
     for name, key in keys.items():
-        unit = f"[{key['unit']}]" if key.get("unit", "unit") != "unit" else coded_unit(key)
-        cells = {"key": f"`{name}`", "unit": unit, "default": default(key),
-                 "accepts": accepts(key), "meaning": meaning(key)}
-        lines.append("| " + " | ".join(cells[column] for column in columns) + " |")
+        words = accepts(key)
+        if group != "sweep":
+            words = words.replace(parameters, "those of `sweep%parameter` but `'frequency'`")
+        lines.append(f"| `{name}` | {default(key)} | {words} | {meaning(key, group)} |")
     return "\n".join(lines)
-
-
-def coded_unit(key: dict[str, Any]) -> str:
-    """The unit that another key names."""
-    return "`unit`" if "unit" in key else ""
 
 
 def tables(groups: Keys, program: str) -> dict[str, tuple[str, str]]:
     """What stands between two marks: {first mark: (last mark, lines)}."""
-    found = {f"keys of {group}": ("end of keys", table(content["keys"]))
+    words = groups["sweep"]["keys"]["parameter"]["words"]
+    parameters = ", ".join(f"`'{word}'`" for word in words if word != "frequency")
+    found = {f"keys of {group}": ("end of keys", table(group, content["keys"], parameters))
              for group, content in groups.items()}
     return found | {"parts of a model file": ("end of parts", parts(program)),
                     "remarks": ("end of remarks", said(program, "--remarks")),
