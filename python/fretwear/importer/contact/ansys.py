@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError, OutputError
-from .deck import Couple, Deck
+from ..deck import Couple
+from .named import NamedMesh
 from .skin import Cells
 
 __all__ = ["is_ansys", "read_ansys_deck"]
@@ -29,14 +30,14 @@ def is_ansys(path: Path) -> bool:
         return any("NBLOCK" in line.upper() for _, line in zip(range(5000), file))
 
 
-def read_ansys_deck(path: Path) -> Deck:
+def read_ansys_deck(path: Path) -> NamedMesh:
     """Nodes, elements, components (CMBLOCK) and pairs of contact elements with one set of real
     constants, called CONTA_3 and TARGE_3 for set 3."""
     try:
         lines = path.read_text(encoding="latin-1").splitlines()
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {error.strerror}") from None
-    deck = Deck(path, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), [])
+    deck = NamedMesh(path, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), [])
     types: dict[int, int] = {}
     places: dict[int, list[float]] = {}
     elements: list[list[int]] = []
@@ -123,7 +124,7 @@ def _component(lines: list[str], k: int) -> tuple[set[int], int]:
     return found, at
 
 
-def _cells(deck: Deck, types: dict[int, int], elements: list[list[int]]) -> None:
+def _cells(deck: NamedMesh, types: dict[int, int], elements: list[list[int]]) -> None:
     at = {node: k for k, node in enumerate(deck.nodes.tolist())}
     blocks: dict[tuple[str, int], list[list[int]]] = {}
     pairs: dict[int, tuple[set[int], set[int]]] = {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..matrix_file import need
 from ..meshes import read_mesh_file
-from .deck import Deck
+from .named import NamedMesh
 from .skin import CELLS, Cells
 
 __all__ = ["read_other_deck"]
@@ -18,12 +18,12 @@ __all__ = ["read_other_deck"]
 _GROUP = "gmsh:physical"
 
 
-def read_other_deck(path: Path) -> Deck:
+def read_other_deck(path: Path) -> NamedMesh:
     """Named groups of cells become element sets, named groups of points node sets."""
     known = read_mesh_file(path)
     mesh: Any = need("meshio", "meshio", "reading meshes", "export").read(path)
     nodes = known.all_nodes
-    deck = Deck(path, known.all_points, nodes, [])
+    deck = NamedMesh(path, known.all_points, nodes, [])
     names = {int(tag): str(name).upper() for name, (tag, _) in mesh.field_data.items()}
     first = 1
     for k, block in enumerate(mesh.cells):
@@ -44,6 +44,6 @@ def read_other_deck(path: Path) -> Deck:
     return deck
 
 
-def _put(deck: Deck, name: str, numbers: Any) -> None:
+def _put(deck: NamedMesh, name: str, numbers: Any) -> None:
     if len(numbers):
         deck.element_sets.setdefault(name, set()).update(numbers.tolist())
