@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, OutputError
 from ...surfaces import RefusedSurfaces, SurfacePairs, contact_pairs
+from ..archive import is_archive
 from ..deck import Couple
 from ..labels import Dofs
 from ..tables import Pairs
 from .abaqus import read_abaqus_deck
-from .ansys import is_ansys, read_ansys_deck
+from .ansys import read_ansys_deck
 from .named import NamedMesh
 from .other import read_other_deck
 
@@ -93,7 +94,7 @@ def read_named(path: str | Path) -> NamedMesh:
         raise OutputError(f"{path}: cannot be read: there is no such file")
     if path.suffix.lower() == ".inp":
         return read_abaqus_deck(path)
-    if path.suffix.lower() in (".cdb", ".dat") and is_ansys(path):
+    if path.suffix.lower() in (".cdb", ".dat") and is_archive(path):
         return read_ansys_deck(path)
     return read_other_deck(path)
 
@@ -179,6 +180,10 @@ def _joined(deck: NamedMesh, couples: Sequence[Couple], found: Sequence[SurfaceP
             raise InputError(f"{deck.path}: node {label[0]} of a contact surface has no component "
                              f"{label[1]} in the matrices; keep the degrees of freedom of both "
                              "surfaces when they are written")
+    turned = sorted(deck.turned & set(deck.nodes[used // d].tolist()))
+    if turned:
+        raise InputError(f"{deck.path}: node {turned[0]} has a rotated nodal frame; pairs of "
+                         "surfaces need components along the global axes: NROTAT none")
     n = sum(len(pairs) for pairs in found)
     points = np.concatenate([pairs.points for pairs in found])
     number, rows_kept = _numbered(_free(deck, found, points, dofs))

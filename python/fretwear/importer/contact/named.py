@@ -47,6 +47,8 @@ class NamedMesh:
         skin, or shells themselves.
     couples : list of Couple
         Contact pairs that it declares.
+    turned : set of int
+        Nodes whose components in the matrices are along axes of their own.
     """
 
     path: Path
@@ -57,6 +59,7 @@ class NamedMesh:
     element_sets: dict[str, set[int]] = field(default_factory=dict)
     surfaces: dict[str, list[tuple[set[int], str]]] = field(default_factory=dict)
     couples: list[Couple] = field(default_factory=list)
+    turned: set[int] = field(default_factory=set)
 
     @cached_property
     def is_plane(self) -> bool:

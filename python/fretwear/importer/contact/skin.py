@@ -26,7 +26,6 @@ _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 #: Edges whose middles follow the corners, by linear names.
 _EDGES: dict[str, tuple[tuple[int, int], ...]] = {
     **{kind.rstrip("0123456789"): edges for kind, edges in EDGES.items()},
-    "pyramid": ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
     "line": ((0, 1),)}
 _KIND = {(2, False): "line", (2, True): "line3", (3, False): "triangle", (3, True): "triangle6",
          (4, False): "quad", (4, True): "quad8"}
