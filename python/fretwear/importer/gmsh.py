@@ -93,9 +93,9 @@ def read_gmsh(path: Path) -> GmshMesh:
         return _Reader(path, sections).read()
     except InputError:
         raise
-    except (ValueError, IndexError):
-        raise InputError(f"{path}: its $Nodes, $Elements or $Entities end too early, or hold other "
-                         "than numbers; write it anew") from None
+    except (ValueError, IndexError, KeyError):
+        raise InputError(f"{path}: its $Nodes, $Elements or $Entities are missing, end too early, or "
+                         "hold other than numbers; write it anew") from None
 
 
 class _Reader:
