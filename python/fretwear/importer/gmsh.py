@@ -94,8 +94,8 @@ def read_gmsh(path: Path) -> GmshMesh:
     except InputError:
         raise
     except (ValueError, IndexError, KeyError):
-        raise InputError(f"{path}: its $Nodes, $Elements or $Entities are missing, end too early, or "
-                         "hold other than numbers; write it anew") from None
+        raise InputError(f"{path}: its $Nodes, $Elements or $Entities are missing, end too early, "
+                         "or hold other than numbers; write it anew") from None
 
 
 class _Reader:
