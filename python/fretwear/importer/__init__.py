@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--check", nargs="?", const="", metavar="PICTURE",
                         help="read and check, say what is found, write no model; of a sector with "
                              "a mesh the PICTURE (.png, .svg, .pdf; .gif and .html move) shows "
-                             "which way the wave of --engine-order runs")
+                             "which way the wave of --engine-order runs, and -o is written too")
     parser.add_argument("--engine-order", type=int, metavar="M",
                         help="of the picture of --check (default: 1)")
     for role in ROLES:
@@ -162,11 +162,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Import a model as told by the command line; returns the exit status."""
     picture = _picture(options)
-    if options.check is None:
-        if options.output is None:
-            raise InputError("nothing to write: give -o MODEL.h5, or --check")
-        if not options.output.absolute().parent.is_dir():
-            raise OutputError(f"no folder to write {options.output} into")
+    if options.check is None and options.output is None:
+        raise InputError("nothing to write: give -o MODEL.h5, or --check")
+    if options.output is not None and not options.output.absolute().parent.is_dir():
+        raise OutputError(f"no folder to write {options.output} into")
     chosen_engine(options.factor)   # refused before the work
     model = _read(options)
     found = [note if isinstance(note, Finding) else Finding("note", "files", note)
@@ -192,7 +191,10 @@ def main(options: argparse.Namespace) -> int:
                 print(finding)
         print(f"no errors in {model.dofs.n} degrees of freedom, "
               f"{0 if model.pairs is None else len(model.pairs)} pairs")
-        return 0
+        if picture is None or options.output is None:
+            if options.output is not None:
+                print(f"{options.output} is not written beside --check without a PICTURE")
+            return 0
     for finding in save(model, options.output, wanted, options.by_diameter,
                         stages(quiet=options.quiet), options.factor,
                         verify=options.up_to if options.verify else None):
@@ -377,6 +379,9 @@ def _sector(model: FullModel, options: argparse.Namespace, from_calculix: bool) 
         raise InputError("--frames cylindrical: CalculiX stores its matrices along the global "
                          "axes, also of nodes with *TRANSFORM; leave --frames out")
     frames = options.frames or ("cartesian" if from_calculix else "cylindrical")
+    if frames == "cylindrical" and (options.contact or options.deck_contact):
+        raise InputError("--contact needs components along the global axes, which its normals are "
+                         "told in: take matrices with these, and --frames cartesian")
     left, right, said = cut_faces(options.sectors, options.left, options.right, options.axis,
                                   model.mesh, _touching(model))
     interfaces = pair_faces(options.sectors, left, right, model.dofs, options.axis, model.mesh)

@@ -1,6 +1,6 @@
-"""Meshes of other programs: decks of Abaqus and CalculiX by this package, ANSYS archives by
-mapdl-archive, all others by meshio, with the numbers of their nodes, which tie them to the rows of
-the matrices, and their sets of nodes.
+"""Meshes of other programs: decks of Abaqus and CalculiX, ANSYS archives and files of Gmsh by this
+package, all others by meshio, with the numbers of their nodes, which tie them to the rows of the
+matrices, and their sets of nodes.
 
 meshio forgets the numbers of Nastran files. They are read here once more, together with the
 positions, which have to be those of meshio in the same order.
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, OutputError
 from ..mesh import CELL_TYPES
+from .archive import CONTACT, TARGET, is_archive, read_archive
 from .deck import EDGES, Deck, read_deck
+from .gmsh import is_text, read_gmsh
 from .matrix_file import need
 
 __all__ = ["ImportedMesh", "mesh_of_deck", "read_mesh_file"]
@@ -90,8 +92,10 @@ def read_mesh_file(path: str | Path) -> ImportedMesh:
         raise OutputError(f"{path}: cannot be read: there is no such file")
     if path.suffix.lower() == ".inp":
         return mesh_of_deck(read_deck(path))
-    if path.suffix.lower() in (".cdb", ".dat") and _is_ansys(path):
+    if path.suffix.lower() in (".cdb", ".dat") and is_archive(path):
         points, nodes, blocks, sets = _read_ansys(path)
+    elif path.suffix.lower() == ".msh" and is_text(path):
+        points, nodes, blocks, sets = _read_gmsh(path)
     else:
         points, nodes, blocks, sets = _read_meshio(path)
     return replace(_linear(path, points, nodes, blocks), sets=sets)
@@ -102,27 +106,28 @@ def mesh_of_deck(deck: Deck) -> ImportedMesh:
     return replace(_linear(deck.path, deck.points, deck.nodes, deck.blocks), sets=deck.node_sets)
 
 
-def _is_ansys(path: Path) -> bool:
-    with open(path, errors="replace") as file:
-        return any("NBLOCK" in line.upper() for _, line in zip(range(5000), file))
-
-
 def _read_ansys(path: Path) -> _Read:
-    archive = need("mapdl_archive", "mapdl-archive", "reading ANSYS archives", "ansys")
-    vtk = need("pyvista", "pyvista", "reading ANSYS archives", "ansys")
-    read = archive.Archive(str(path))
-    grid = read.grid
-    blocks = []
-    for kind, cells in grid.cells_dict.items():
-        # QUADRATIC_TETRA and so on: corners come first.
-        name = vtk.CellType(kind).name.lower().rsplit("_")[-1]
-        table = np.asarray(cells, dtype=np.int64)
-        whole = f"{name}{table.shape[-1]}"
-        blocks.append((whole if whole in EDGES else name, table))
-    sets = {str(name).upper(): np.asarray(nodes).astype(int).tolist()
-            for name, nodes in read.node_components.items()}
-    return (np.asarray(grid.points, dtype=float),
-            np.asarray(grid.point_data["ansys_node_num"], dtype=np.int64), blocks, sets)
+    """Cells of an archive without the contact elements that lie on them."""
+    read = read_archive(path)
+    place = {node: k for k, node in enumerate(read.nodes.tolist())}
+    blocks: dict[tuple[str, int], list[list[int]]] = {}
+    for element in read.elements:
+        if element.shape and element.kind not in (*CONTACT, *TARGET):
+            blocks.setdefault((element.shape, len(element.nodes)), []).append(
+                [place[node] for node in element.nodes])
+    return (read.points, read.nodes,
+            [(f"{shape}{n}" if f"{shape}{n}" in EDGES else shape, np.array(rows, dtype=np.int64))
+             for (shape, n), rows in blocks.items()],
+            {name: sorted(nodes) for name, nodes in read.node_sets.items()})
+
+
+def _read_gmsh(path: Path) -> _Read:
+    read = read_gmsh(path)
+    inside = {number: read.nodes[row].tolist() for (_, table), numbers in
+              zip(read.blocks, read.numbers) for number, row in zip(numbers.tolist(), table)}
+    sets = {name: sorted({node for cell in cells for node in inside[cell]})
+            for name, cells in read.groups.items()}
+    return read.points, read.nodes, read.blocks, sets
 
 
 def _read_meshio(path: Path) -> _Read:

@@ -188,6 +188,9 @@ def in_sector_frames(model: FullModel, interfaces: Interfaces) -> FullModel:
         speeds={speed: sp.csr_array(q.T @ matrix @ q) for speed, matrix in model.speeds.items()},
         stress=None if model.stress is None else replace(
             model.stress, rows=sp.csr_array(model.stress.rows @ q)),
+        # Rows are of the degrees of freedom of the files, as those of stress.
+        pairs=model.pairs if model.pairs is None or model.pairs.rows is None else replace(
+            model.pairs, rows=sp.csr_array(model.pairs.rows @ q)),
         notes=[*model.notes, f"{len(interfaces.right_nodes)} nodes of the right interface are in "
                "the frame of the next sector"])
 

@@ -175,7 +175,7 @@ def facets_of(surface: Surface, points: Floats, kinds: list[str], nodes: Ints) -
     area = np.linalg.norm(cross, axis=1)
     radius = np.linalg.norm(place - centre[:, None], axis=2).max(axis=1)
     if (area <= 1e-12 * radius**2).any():
-        bad = int(face[np.argmin(area / np.maximum(radius, 1e-300)**2)])
+        bad = int(face[np.argmax(area <= 1e-12 * radius**2)])
         raise InputError(f"{surface.name}: face {bad} has no area; its points are "
                          + ", ".join(map(str, surface.nodes[bad][surface.nodes[bad] >= 0])))
     return Facets(kind_of, face, nodes[face], count, place, where, centre,

@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, OutputError
 from ...surfaces import RefusedSurfaces, SurfacePairs, contact_pairs
+from ..archive import is_archive
+from ..deck import Couple
 from ..labels import Dofs
 from ..tables import Pairs
 from .abaqus import read_abaqus_deck
-from .ansys import is_ansys, read_ansys_deck
-from .deck import Couple, Deck
+from .ansys import read_ansys_deck
+from .named import NamedMesh
 from .other import read_other_deck
 
-__all__ = ["Couple", "Deck", "add_contact_arguments", "pairs_of_options", "pairs_of_surfaces",
-           "read_deck"]
+__all__ = ["Couple", "NamedMesh", "add_contact_arguments", "pairs_of_options",
+           "pairs_of_surfaces", "read_named"]
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +72,7 @@ def pairs_of_options(options: argparse.Namespace, dofs: Dofs, job: Path | None =
     if file is None:
         raise InputError("--contact needs --mesh FILE or --contact-mesh FILE: the deck that names "
                          "the surfaces")
-    deck = read_deck(file)
+    deck = read_named(file)
     couples = [Couple(one, two) for one, two in options.contact]
     if options.deck_contact:
         couples += deck.couples
@@ -84,7 +86,7 @@ def pairs_of_options(options: argparse.Namespace, dofs: Dofs, job: Path | None =
                              picture=picture)
 
 
-def read_deck(path: str | Path) -> Deck:
+def read_named(path: str | Path) -> NamedMesh:
     """Sets, surfaces and contact pairs of Abaqus and CalculiX input (.inp), ANSYS archives (.cdb)
     and meshes that meshio reads, such as those of Gmsh."""
     path = Path(path)
@@ -92,12 +94,12 @@ def read_deck(path: str | Path) -> Deck:
         raise OutputError(f"{path}: cannot be read: there is no such file")
     if path.suffix.lower() == ".inp":
         return read_abaqus_deck(path)
-    if path.suffix.lower() in (".cdb", ".dat") and is_ansys(path):
+    if path.suffix.lower() in (".cdb", ".dat") and is_archive(path):
         return read_ansys_deck(path)
     return read_other_deck(path)
 
 
-def pairs_of_surfaces(deck: Deck, couples: Sequence[Couple], dofs: Dofs, *,
+def pairs_of_surfaces(deck: NamedMesh, couples: Sequence[Couple], dofs: Dofs, *,
                       mu: float | None = None, reach: float | None = None,
                       thickness: float = 1.0, tangent: Sequence[float] | None = None,
                       picture: Path | None = None) -> tuple[Pairs, list[str]]:
@@ -105,7 +107,7 @@ def pairs_of_surfaces(deck: Deck, couples: Sequence[Couple], dofs: Dofs, *,
 
     Parameters
     ----------
-    deck : Deck
+    deck : NamedMesh
         Which names them.
     couples : sequence of Couple
         Surface 1 of each carries the pairs.
@@ -161,7 +163,7 @@ def _said(pairs: SurfacePairs) -> str:
     return text + (f"; area without a partner: {', '.join(left)}" if left else "")
 
 
-def _joined(deck: Deck, couples: Sequence[Couple], found: Sequence[SurfacePairs], dofs: Dofs,
+def _joined(deck: NamedMesh, couples: Sequence[Couple], found: Sequence[SurfacePairs], dofs: Dofs,
             mu: float | None, notes: list[str]) -> Pairs:
     """All pairs as one table."""
     assert dofs.labels is not None
@@ -178,6 +180,10 @@ def _joined(deck: Deck, couples: Sequence[Couple], found: Sequence[SurfacePairs]
             raise InputError(f"{deck.path}: node {label[0]} of a contact surface has no component "
                              f"{label[1]} in the matrices; keep the degrees of freedom of both "
                              "surfaces when they are written")
+    turned = sorted(deck.turned & set(deck.nodes[used // d].tolist()))
+    if turned:
+        raise InputError(f"{deck.path}: node {turned[0]} has a rotated nodal frame; pairs of "
+                         "surfaces need components along the global axes: NROTAT none")
     n = sum(len(pairs) for pairs in found)
     points = np.concatenate([pairs.points for pairs in found])
     number, rows_kept = _numbered(_free(deck, found, points, dofs))
@@ -198,7 +204,7 @@ def _joined(deck: Deck, couples: Sequence[Couple], found: Sequence[SurfacePairs]
         [f"{name}, node {deck.nodes[point]}" for name, point in zip(names, points)])
 
 
-def _free(deck: Deck, found: Sequence[SurfacePairs], points: NDArray[np.int64], dofs: Dofs
+def _free(deck: NamedMesh, found: Sequence[SurfacePairs], points: NDArray[np.int64], dofs: Dofs
           ) -> NDArray[np.bool_]:
     """Directions (n_pairs, d) that are kept: not tangential ones along which the node of a pair is
     held, where the displacements of its neighbours would be those of several pairs."""

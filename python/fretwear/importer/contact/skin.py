@@ -19,14 +19,14 @@ Ints = NDArray[np.int64]
 
 #: Corners and dimension of the cells that have faces, by their linear names in meshio.
 CELLS = {"tetra": (4, 3), "hexahedron": (8, 3), "wedge": (6, 3), "pyramid": (5, 3),
-         "triangle": (3, 2), "quad": (4, 2)}
+         "triangle": (3, 2), "quad": (4, 2), "line": (2, 1)}
 #: Corners of the faces of solids as Abaqus numbers them, and of the edges of plane cells.
 _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     **FACES, "triangle": ((0, 1), (1, 2), (2, 0)), "quad": ((0, 1), (1, 2), (2, 3), (3, 0))}
 #: Edges whose middles follow the corners, by linear names.
 _EDGES: dict[str, tuple[tuple[int, int], ...]] = {
     **{kind.rstrip("0123456789"): edges for kind, edges in EDGES.items()},
-    "pyramid": ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))}
+    "line": ((0, 1),)}
 _KIND = {(2, False): "line", (2, True): "line3", (3, False): "triangle", (3, True): "triangle6",
          (4, False): "quad", (4, True): "quad8"}
 

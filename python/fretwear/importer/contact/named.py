@@ -13,26 +13,21 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...surfaces import Surface
+from ..deck import Couple
 from ..tables import read_table
 from .skin import CELLS, Cells, Faces, faces_of, surface_of
 
-__all__ = ["Couple", "Deck"]
+__all__ = ["NamedMesh"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-
-@dataclass(frozen=True)
-class Couple:
-    """Two surfaces that touch, by their names in a deck, and their friction where it says that."""
-
-    one: str
-    two: str
-    mu: float | None = None
+#: Faces of shells against their normal.
+_NEGATIVE = ("SNEG", "S1")
 
 
 @dataclass
-class Deck:
+class NamedMesh:
     """What a deck names; names are in capitals.
 
     Attributes
@@ -47,10 +42,13 @@ class Deck:
         Blocks of cells.
     node_sets, element_sets : dict of str to set of int
         Numbers.
-    surfaces : dict of str to list of (set of int, int)
-        Elements with the number of their face; 0: their faces on the skin, or shells themselves.
+    surfaces : dict of str to list of (set of int, str)
+        Elements with their face S1, S2, ... or, of shells, SPOS or SNEG; '': their faces on the
+        skin, or shells themselves.
     couples : list of Couple
         Contact pairs that it declares.
+    turned : set of int
+        Nodes whose components in the matrices are along axes of their own.
     """
 
     path: Path
@@ -59,10 +57,11 @@ class Deck:
     cells: list[Cells]
     node_sets: dict[str, set[int]] = field(default_factory=dict)
     element_sets: dict[str, set[int]] = field(default_factory=dict)
-    surfaces: dict[str, list[tuple[set[int], int]]] = field(default_factory=dict)
+    surfaces: dict[str, list[tuple[set[int], str]]] = field(default_factory=dict)
     couples: list[Couple] = field(default_factory=list)
+    turned: set[int] = field(default_factory=set)
 
-    @property
+    @cached_property
     def is_plane(self) -> bool:
         """Whether all cells lie in one plane z, so that edges touch and not faces."""
         if any(CELLS[block.kind][1] == 3 for block in self.cells):
@@ -93,7 +92,7 @@ class Deck:
             chosen = [part for elements, label in self.surfaces[key]
                       for part in self._of_elements(elements, label)]
         elif key in self.element_sets:
-            chosen = self._of_elements(self.element_sets[key], 0)
+            chosen = self._of_elements(self.element_sets[key])
         elif key in self.node_sets:
             chosen = self._of_nodes(self.node_sets[key])
         elif Path(name).is_file():
@@ -122,28 +121,40 @@ class Deck:
         return [(faces.nodes[k], int(faces.n_corners[k])) for k in np.flatnonzero(faces.is_skin)
                 if inside[list(faces.nodes[k][:faces.n_corners[k]])].all()]
 
-    def _of_elements(self, numbers: set[int], label: int
+    def _of_elements(self, numbers: set[int], label: str = ""
                      ) -> list[tuple[tuple[int, ...], int]]:
-        """Faces of elements by their number, or all outer ones; shells themselves."""
+        """Faces of elements by their name, or all outer ones; shells, or lines of a plane mesh,
+        themselves."""
         faces = self.faces
         own = np.isin(faces.element, list(numbers))
-        own &= faces.label == label if label else faces.is_skin
+        own &= faces.label == int(label[1:]) if label[1:].isdigit() else faces.is_skin
         found = [(faces.nodes[k], int(faces.n_corners[k])) for k in np.flatnonzero(own)]
-        if self.is_plane:
-            return found
-        oriented: dict[tuple[int, ...], int] | None = None
         for block in self.cells:
             n, dimension = CELLS[block.kind]
-            if dimension == 3:
+            if dimension != (1 if self.is_plane else 2):
                 continue
             for cell in block.points[np.isin(block.number, list(numbers))].tolist():
-                if oriented is None:
-                    oriented = {key: k for k, key in enumerate(faces.keys()) if faces.is_skin[k]}
                 # Faces on a solid look out of it, whatever way their corners go round.
-                k = oriented.get(tuple(sorted(set(cell[:n]))), -1)
-                found.append((faces.nodes[k], int(faces.n_corners[k])) if k >= 0 else
-                             (tuple(cell[:2 * n] if block.is_quadratic else cell[:n]), n))
+                k = self._outer.get(tuple(sorted(set(cell[:n]))), -1)
+                if k >= 0:
+                    found.append((faces.nodes[k], int(faces.n_corners[k])))
+                elif not self.is_plane:
+                    found.append((_turned(cell, n, block.is_quadratic)
+                                  if label in _NEGATIVE else
+                                  tuple(cell[:2 * n] if block.is_quadratic else cell[:n]), n))
         return found
+
+    @cached_property
+    def _outer(self) -> dict[tuple[int, ...], int]:
+        """Faces of the skin by their sorted corners."""
+        faces = self.faces
+        return {key: k for k, key in enumerate(faces.keys()) if faces.is_skin[k]}
+
+
+def _turned(cell: list[int], n: int, quadratic: bool) -> tuple[int, ...]:
+    """A shell the other way round from the same corner; the middles follow their edges."""
+    corners = [cell[0], *cell[n - 1:0:-1]]
+    return (*corners, *(cell[2 * n - 1:n - 1:-1] if quadratic else ()))
 
 
 def _node_table(path: Path) -> set[int]:
