@@ -25,7 +25,7 @@ if [ -n "${ONLY_LIBRARIES:-}" ]; then exit 0; fi
 
 # Without FFTW, as the wheels: the package may be given away under the BSD licence.
 CMAKE_PREFIX_PATH="$libraries:$PREFIX" "$PYTHON" -m pip install "$SRC_DIR/fretwear" -vv --no-deps \
-   --no-build-isolation -C cmake.define.FRETWEAR_FFT=none \
-   -C "cmake.define.CMAKE_INSTALL_RPATH=$libraries/lib"
+   --no-build-isolation --config-settings=cmake.define.FRETWEAR_FFT=none \
+   "--config-settings=cmake.define.CMAKE_INSTALL_RPATH=$libraries/lib"
 # What only a compiler reads stays out of the package.
 rm -rf "$libraries"/{include,fortran,lib/cmake,lib/libminpack.a}
