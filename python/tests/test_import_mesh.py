@@ -247,7 +247,7 @@ def test_ansys_archives_name_their_nodes(beam: tuple[Beam, Path]) -> None:
 
 def test_a_period_moves_in_a_picture(beam: tuple[Beam, Path]) -> None:
     pytest.importorskip("pyvista")
-    from PIL import Image
+    from PIL import Image, ImageSequence
 
     _, folder = beam
     path = _import(folder, "moving.h5", "--mesh", str(folder / "beam.inp"))
@@ -255,4 +255,12 @@ def test_a_period_moves_in_a_picture(beam: tuple[Beam, Path]) -> None:
         folder / "beam.gif", scalars="open", frames=2, size=(160, 120))
     with Image.open(folder / "beam.gif") as image:
         assert image.size == (160, 120) and image.n_frames == 2
+    # The scene moves; below it colours and factor stand still, where no part comes.
+    _run(path, folder / "moving_frf.h5").animate(folder / "beam.png", scalars="open", frames=2,
+                                                 size=(160, 120))
+    with Image.open(folder / "beam.png") as image:
+        first, last = (np.asarray(frame.convert("RGB"), dtype=int)
+                       for frame in ImageSequence.Iterator(image))
+    assert (first[:101] != last[:101]).any() and (first[101:] == last[101:]).all()
+    assert first[101:].min() < 128
     assert "data:image/gif;base64" in shown._repr_html_()

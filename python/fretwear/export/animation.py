@@ -29,6 +29,9 @@ _FORMATS = {".gif": "GIF", ".webp": "WEBP", ".png": "PNG"}
 _SHOWN = 0.12
 #: How much of the bodies is seen, so that the faces between them are.
 _OPACITY = 0.18
+#: Height of the strip below the scene, over that of the picture: colours and factor.
+_STRIP = 0.16
+_COLOURS = "viridis"
 
 
 @dataclass(frozen=True)
@@ -106,12 +109,15 @@ def animate(result: Result | str | Path, file: str | Path | None = None, *,
     if scalars not in fields.pairs:
         raise InputError(f"scalars = {scalars!r}: of the pairs this result knows "
                          + (", ".join(fields.pairs) or "nothing"))
-    scene = _Scene(pyvista, fields, scalars, size)
+    strip = round(_STRIP * size[1])
+    scene = _Scene(pyvista, fields, scalars, (size[0], size[1] - strip))
     drawn = _SHOWN * scene.length / scene.largest if factor is None and scene.largest > 0.0 \
         else factor or 1.0
     scene.plotter.view_vector(view, up)
-    scene.plotter.camera.zoom(0.9)   # room for the motion, and for the bar
-    pictures = [scene.draw(360.0 * k / frames, drawn, turn / frames) for k in range(frames)]
+    scene.plotter.camera.zoom(0.9)   # room for the motion
+    below = _strip(scene.title, scene.limits, drawn, (size[0], strip))
+    pictures = [np.concatenate([scene.draw(360.0 * k / frames, drawn, turn / frames), below])
+                for k in range(frames)]
     scene.plotter.close()
     image = _packed(pictures, _FORMATS[target.suffix.lower()])
     if file is not None:
@@ -141,6 +147,29 @@ def _packed(pictures: list[Floats], kind: str) -> bytes:
     return buffer.getvalue()
 
 
+def _strip(title: str, limits: tuple[float, float], factor: float,
+           size: tuple[int, int]) -> Floats:
+    """What the colours mean and how much larger the motion is drawn, below the scene: in front of
+    it a bar would hide parts that move."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    dpi = 100.0 * size[0] / 480.0   # the text as wide a part of every picture
+    figure = Figure(figsize=(size[0] / dpi, size[1] / dpi), dpi=dpi)
+    canvas: Any = FigureCanvasAgg(figure)
+    bar = figure.add_axes((0.06, 0.45, 0.34, 0.2))
+    figure.colorbar(ScalarMappable(Normalize(*limits), _COLOURS), cax=bar,
+                    orientation="horizontal", ticks=limits, format="%.2g")
+    bar.tick_params(labelsize=8)
+    figure.text(0.23, 0.74, title, fontsize=9, ha="center", va="bottom")
+    said = "to scale" if factor == 1.0 else f"drawn {factor:.3g} times as large"
+    figure.text(0.7, 0.5, f"displacements {said}", fontsize=8, ha="center", va="center")
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+
 class _Scene:
     """Bodies, seen through, and the faces in contact, coloured."""
 
@@ -160,7 +189,8 @@ class _Scene:
         self.plotter = pyvista.Plotter(off_screen=True, window_size=size)
         self.plotter.set_background("white")
         units = fields.pairs[scalars][1]
-        title = scalars.replace("_", " ") + (f" [{units}]" if units not in ("", "1") else "")
+        self.title = scalars.replace("_", " ") + (f" [{units}]" if units not in ("", "1") else "")
+        self.limits = _limits(fields.pairs[scalars][0], units)
         for which in (~touching, touching):
             if not which.any():
                 continue
@@ -172,12 +202,8 @@ class _Scene:
             self.parts.append((surface, origin))
             if which is touching:
                 self.plotter.add_mesh(
-                    surface, scalars=scalars, cmap="viridis", show_edges=False, lighting=False,
-                    clim=_limits(fields.pairs[scalars][0], units),
-                    scalar_bar_args={"title": title, "color": "black", "n_labels": 2,
-                                     "title_font_size": 18, "label_font_size": 16, "fmt": "%.2g",
-                                     "position_x": 0.3, "position_y": 0.01,
-                                     "width": 0.4, "height": 0.09})
+                    surface, scalars=scalars, cmap=_COLOURS, show_edges=False, lighting=False,
+                    clim=self.limits, show_scalar_bar=False)
             else:
                 self.plotter.add_mesh(surface, color="#7a8694", opacity=_OPACITY,
                                       silhouette={"color": "#303840", "line_width": 1.5})

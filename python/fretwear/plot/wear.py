@@ -201,5 +201,6 @@ def _duration(result: Result) -> str:
     seconds = float(result.cycles[-1] / result.frequency[0])
     for name, size in (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0)):
         if seconds >= size:
-            return f"; the last cycle after {seconds / size:.2g} {name}"
+            # Two digits, and no power of ten in a title: 290 years.
+            return f"; the last cycle after {float(f'{seconds / size:.2g}'):,.10g} {name}"
     return f"; the last cycle after {seconds:.2g} s"
