@@ -365,8 +365,8 @@ class _Rows:
         row = np.zeros(self._n_dof)
         k = abs(int(number))
         if k > n_before + len(self._rows):
-            raise InputError(f"dofs of left or right: has {number}, must be a dof from 1 to {n_before} "
-                             "or a row behind them, with its sign, or 0 for the ground")
+            raise InputError(f"dofs of left or right: has {number}, must be a dof from 1 to "
+                             f"{n_before} or a row behind them, with its sign, or 0 for the ground")
         if k > n_before:
             row[:] = self._rows[k - n_before - 1]
         elif k > 0:

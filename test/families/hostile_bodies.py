@@ -28,9 +28,9 @@ files cut anywhere, and files of another kind.
 
 The judge knows what each draw has to come to. What is wrong has to end with status 3 (in Python an
 `InputError`, of a command any status but 0), with a message that names the key, part or argument
-and says what to do or what is missing. A file that was cut may be refused or not, but what is solved then has to be
-the answer of the whole file (1e-9 of the largest displacement). Nothing may end by a signal, with
-words of the runtime of Fortran or HDF5, or with a traceback.
+and says what to do or what is missing. A file that was cut may be refused or not, but what is
+solved then has to be the answer of the whole file (1e-9 of the largest displacement). Nothing may
+end by a signal, with words of the runtime of Fortran or HDF5, or with a traceback.
 """
 COUNT = 300
 #: Some of every kind.
@@ -45,8 +45,8 @@ RUNTIME = ("Fortran runtime", "SIGSEGV", "Backtrace", "HDF5-DIAG", "Traceback", 
            "malloc", "free()", "terminate called", "ERROR STOP", "AddressSanitizer")
 REMEDY = re.compile(
     r"\b(must|give|gives|use|take|leave|needs?|run|make|made|add|set|write|choose|switch|at least|"
-    r"at most|has to|is missing|is given without|have to|is one of|expected|did you mean|required|invalid choice|"
-    r"unrecognized|invalid (?:float|int) value)\b")
+    r"at most|has to|is missing|is given without|have to|is one of|expected|did you mean|required|"
+    r"invalid choice|unrecognized|invalid (?:float|int) value)\b")
 NAN, INF = float("nan"), float("inf")
 
 
@@ -349,8 +349,6 @@ def ended(status, message, name, found):
     """Judge an end that had to be a refusal."""
     if status < 0 or any(word in message for word in RUNTIME):
         found["crash"] = 1
-    elif status == 0:
-        found["taken"] = 1
     elif status != 3:
         found["taken"] = 1
     else:
