@@ -30,6 +30,8 @@ __all__ = ["KINDS", "Flank", "damper"]
 
 Floats = NDArray[np.float64]
 
+#: Of contact, as the key contact%law has them.
+LAWS = ("dlft", "dlft_velocity", "penalty", "rigid", "regularised", "iwan", "bouc_wen")
 KINDS = ("wedge", "cylinder", "strip", "split_ring", "mesh")
 #: Flanks of these lie at 90 degrees to the radial direction.
 _FLAT = ("strip", "split_ring")
@@ -138,6 +140,11 @@ def damper(model: Model, kind: str = "wedge", *, mass: float | None = None,
         raise InputError(f"angles: are {angles}, must be (90, 90) for a {kind}")
     if len(angles) != 2 or not all(0.0 < angle < 180.0 for angle in angles):
         raise InputError(f"angles: are {angles}, must be two between 0 and 180 degrees")
+    if kind != "mesh" and not (matrices is None and load is None):
+        raise InputError(f"{'load' if matrices is None else 'matrices'}: is given, must be left "
+                         f"out of a {kind}; kind = 'mesh' takes it")
+    if law is not None and law not in LAWS:
+        raise InputError(f"law: is {law!r}, must be one of {', '.join(LAWS)}")
     if max(angles) < _RADIANS:
         warnings.warn(f"angles: are {angles}, below {_RADIANS:g} degrees: give degrees, not "
                       "radians", stacklevel=2)
@@ -158,6 +165,13 @@ def damper(model: Model, kind: str = "wedge", *, mass: float | None = None,
     return _joined(model, body, points, radius, compliance, law, name, space, {
         "mu": mu, "tangential_stiffness": tangential_stiffness,
         "normal_stiffness": normal_stiffness})
+
+
+def _not_negative(name: str, values: ArrayLike, n: int) -> Floats:
+    found = array(name, values, (n,))
+    if (found < 0.0).any():
+        raise InputError(f"{name}: has {found.min()}, must be at least 0")
+    return found
 
 
 def _remark_pull(points: list[_Point]) -> None:
@@ -236,7 +250,7 @@ def _points(kind: str, side: int, flank: Flank, angle: float,
 
 
 def _rigid(mass: float | None, inertia: ArrayLike | None, space: bool) -> _Body:
-    if mass is None or not np.isfinite(mass) or mass <= 0.0:
+    if mass is None or not float(array("mass", mass, ())) > 0.0:
         raise InputError(f"mass: is {mass}, must be above 0")
     slots: tuple[int, ...] = (0, 1, 2) if space else (0, 1)
     unit = np.zeros((6, 6))
@@ -293,6 +307,8 @@ def _joined(model: Model, body: _Body, points: list[_Point], radius: float,
             compliance: tuple[float, float] | None, law: str | None, name: str, space: bool,
             constants: dict[str, Any]) -> Model:
     components = (0, 1, 2) if space else (0, 2)
+    if compliance is not None:
+        _not_negative("compliance", compliance, 2)
     n_nodes = 0 if compliance is None else len(points) * len(components)
     first, n = model.n_dof, model.n_dof + body.n + n_nodes
     parts = longer_parts(model, body.n + n_nodes)
@@ -319,7 +335,7 @@ def _joined(model: Model, body: _Body, points: list[_Point], radius: float,
     _add_matrices(parts, stiffness, body, first, n)
     parts["rows"] = rows.matrix()
     given: dict[str, Any] = {
-        key: np.broadcast_to(np.asarray(value, dtype=float), (len(points),))
+        key: _not_negative(key, value, len(points))
         for key, value in constants.items() if value is not None}
     pairs = ContactPairs(side_1, side_2, sector_2=[point.sector for point in points], **given)
     n_before = model.n_pairs
@@ -349,8 +365,8 @@ class _Rows:
         row = np.zeros(self._n_dof)
         k = abs(int(number))
         if k > n_before + len(self._rows):
-            raise InputError(f"dofs of a flank: has {number}, must be a dof from 1 to {n_before} "
-                             "or a row behind them, with its sign, or 0 for the ground")
+            raise InputError(f"dofs of left or right: has {number}, must be a dof from 1 to "
+                             f"{n_before} or a row behind them, with its sign, or 0 for the ground")
         if k > n_before:
             row[:] = self._rows[k - n_before - 1]
         elif k > 0:

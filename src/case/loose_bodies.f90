@@ -101,22 +101,25 @@ contains
          associate (dofs => pack(self%dof(:, i), self%dof(:, i) /= 0), &
                     unit => self%unit_mass(:, :, i))
             if (any(dofs < 1 .or. dofs > n_dof)) then
-               fault = 'a body/dof beyond 0 to '//to_text(n_dof)//', of body '//to_text(i)
+               k = findloc(dofs < 1 .or. dofs > n_dof, .true., dim=1)
+               fault = 'a body/dof of body '//to_text(i)//' that is '//to_text(dofs(k))// &
+                       ': must be from 0 to '//to_text(n_dof)
             else if (size(dofs) == 0 .or. any([(count(dofs == dofs(k)) > 1, &
                                                 k=1, size(dofs))])) then
-               fault = 'a body/dof that is empty or stands twice, of body '//to_text(i)
+               fault = 'a body/dof that is empty or stands twice, of body '//to_text(i)// &
+                       ': must be another dof each'
             else if (.not. all(ieee_is_finite(unit))) then
-               fault = 'a body/unit_mass that is not finite, of body '//to_text(i)
+               fault = 'a body/unit_mass of body '//to_text(i)//': must be finite'
             else if (any(abs(unit - transpose(unit)) > 1.0e-12_wp*maxval(abs(unit)))) then
-               fault = 'a body/unit_mass that is not symmetric, of body '//to_text(i)
+               fault = 'a body/unit_mass of body '//to_text(i)//': must be symmetric'
             else if (.not. (self%mass(i) > 0.0_wp .and. self%mass(i) <= huge(1.0_wp))) then
-               fault = 'a body/mass that is not above 0, of body '//to_text(i)
+               fault = 'a body/mass of body '//to_text(i)//': must be above 0'
             end if
          end associate
          if (len_trim(fault) > 0) return
          if (.not. allocated(self%radius)) cycle
          if (all(ieee_is_finite(self%direction(:, i))) .and. ieee_is_finite(self%radius(i))) cycle
-         fault = 'a body/radius or body/direction that is not finite, of body '//to_text(i)
+         fault = 'a body/radius or body/direction of body '//to_text(i)//': must be finite'
          return
       end do
    end subroutine find_fault

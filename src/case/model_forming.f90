@@ -267,7 +267,8 @@ contains
                                  options%rotation_speed**2*raw%bodies%unit_load(i, n)
          end do
          change%damping = options%rayleigh_mass*change%mass
-         change%value = raw%bodies%mass(1)
+         ! Without bodies it is refused later, in words.
+         if (raw%bodies%count() > 0) change%value = raw%bodies%mass(1)
       case default ! changes no matrix
       end select
    end subroutine find_change

@@ -62,7 +62,7 @@ contains
       if (status < 0) then
          call fatal_error(error, path//': cannot be read (a folder, or not permitted?)', status_io)
       else if (.not. found) then
-         call fatal_error(error, path//': is not an HDF5 file', status_input)
+         call fatal_error(error, path//': is not an HDF5 file, must be one', status_input)
       end if
       if (allocated(error)) return
       call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)

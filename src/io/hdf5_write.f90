@@ -61,7 +61,8 @@ contains
       if (size(dims) == 0) then
          call h5screate_f(h5s_scalar_f, space, status)
       else
-         call h5screate_simple_f(size(dims), int(dims, hsize_t), space, status)
+         ! An extent below 0 is one of nothing: HDF5 takes it for one of 2**64 and prints a stack.
+         call h5screate_simple_f(size(dims), int(max(0, dims), hsize_t), space, status)
       end if
    end function new_space
 

@@ -63,8 +63,11 @@ contains
          reason = 'its derivative is not known'
       end if
       if (.not. allocated(reason)) return
-      call fatal_error(error, asked_by//" = '"//trim(parameter_words(number))//"': "//reason// &
-                       '; leave it out', status_input)
+      ! What the reason says to give is one remedy, to ask for nothing is the other.
+      reason = reason//trim(merge(', or leave it out', '; leave it out   ', &
+                                  index(reason, ': give ') > 0))
+      call fatal_error(error, asked_by//" = '"//trim(parameter_words(number))//"': "//reason, &
+                       status_input)
    end subroutine check_parameter
 
    !> A factor of nothing; of waves the loads are not in these columns alone.
@@ -155,7 +158,7 @@ contains
       case default
          if (.not. allocated(contact%slider_1) .and. number == slider_1 .or. &
              .not. allocated(contact%slider_2) .and. number == slider_2) then
-            reason = 'contact%'//trim(key)//' is not given (values of 0 serve)'
+            reason = 'contact%'//trim(key)//' is not given: give it (values of 0 serve)'
          end if
       end select
    end subroutine check_of_assembly
@@ -205,7 +208,7 @@ contains
          reason = 'no sector differs: give &cyclic mistuned = .true. and group &mistuning '// &
                   '(values of 0 serve)'
       else if (size(values) == 0) then
-         reason = 'mistuning%'//trim(key)//' is not given (values of 0 serve)'
+         reason = 'mistuning%'//trim(key)//' is not given: give it (values of 0 serve)'
       else if (number /= mistuning_scale .and. asked_by /= derived) then
          reason = "values go from blade to blade: use 'mistuning%scale'"
       end if

@@ -58,13 +58,14 @@ contains
    end subroutine read_contact
 
    !> Residual tractions in the middle of what balances, unless they are given: values of a file
-   !> have passed no range.
+   !> have passed no range, those of the namelist that of their key.
    subroutine read_residual(reader, contact)
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(inout) :: contact
       integer :: i
 
       if (allocated(contact%residual)) then
+         if (reader%given('contact', 'residual')) return
          i = findloc(abs(contact%residual) <= 1.0_wp, .false., dim=1)
          if (i > 0) call reader%refuse('contact', 'residual', '= '// &
                                        to_text(contact%residual(i))//' for pair '//to_text(i)// &

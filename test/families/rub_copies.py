@@ -21,6 +21,12 @@ integral of p (|v| - du/dt . v/|v|) over coefficients (1e-7 of the largest rate;
 instants 1e-4), the work of loads and obstacles against that of friction and damping (1e-8); and the
 run is ended after half of its steps and continued (1e-9 of the depths). Laws of smooth friction
 wear on sides that slide steadily alone.
+
+Integration in time judges two rubs elsewhere (`test_obstacles.py`): with 25, 49 and 99 harmonics
+the balance parts from it by 2.9e-4, 5.0e-5 and 1.5e-5 of the largest displacement under smooth
+friction, by 1.2e-3, 5.8e-4 and 1.3e-4 under rigid friction. Those are the harmonics left out: they
+fall with their number to the power of 2.1 and 1.6, and balances part from one another by as much.
+The march of the rigid law is of first order in its steps: 3e-5 with 16,384.
 """
 COUNT = 60
 SMALL = (0, 1, 2, 3)

@@ -1,5 +1,6 @@
 """Bodies that only rotation presses: what `fretwear.damper` makes, and what a run makes of it."""
 import json
+import subprocess
 from types import SimpleNamespace
 
 import h5py
@@ -11,6 +12,7 @@ from project import PROGRAM, ROOT
 
 import fretwear as fw
 from fretwear.cli import main
+from fretwear.dampers import LAWS
 from fretwear.errors import InputError
 from fretwear.plot import fitting, plot_damper
 
@@ -340,11 +342,26 @@ def test_bodies_one_after_another(tmp_path):
     ({"left": fw.Flank([[1, 9]], [[0.0, 0.0]])}, "9"),
     ({"left": fw.Flank([[1, 2]])}, "left.points"),
     ({"left": fw.Flank([[1, 2, 3]], [[0.0, 0.0, 0.0]])}, "2 and 3 columns"),
-    ({"mu": [0.1, 0.2]}, "shape"),
+    ({"mu": [0.1, 0.2]}, "shape"), ({"mu": -0.1}, "mu: has -0.1"),
+    ({"mass": [0.1, 0.2]}, "mass"), ({"compliance": (1.0,)}, "compliance"),
+    ({"compliance": (1.0, -2.0)}, "compliance: has -2.0"),
+    ({"normal_stiffness": -1.0}, "normal_stiffness: has -1.0"), ({"law": "sticky"}, "bouc_wen"),
+    ({"load": [1.0]}, "load: is given"), ({"matrices": (M, K, None)}, "matrices: is given"),
 ])
 def test_bad_input(changes, wanted):
     with pytest.raises((InputError, ValueError), match=wanted):
         wedge(**changes)
+
+
+def test_laws_are_those_of_the_key():
+    shown = subprocess.run([PROGRAM, "--keys=json"], text=True, capture_output=True, check=True)
+    assert sorted(LAWS) == sorted(json.loads(shown.stdout)["contact"]["keys"]["law"]["words"])
+
+
+def test_derivative_by_a_mass_that_is_not_there(tmp_path):
+    blades().to_hdf5(tmp_path / "model.h5")
+    case = with_model(at(120.0, speed=0.0, sensitivity={"parameters": ["body%mass"]}))
+    assert "the model has no bodies" in run(tmp_path, case, status=3).stderr
 
 
 def test_bad_kind():

@@ -242,21 +242,25 @@ def test_slider_of_two_directions(tmp_path):
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    ({"contact": {"memory": "residual", "residual": 1.2}}, "residual = 1.2"),
+    ({"contact": {"memory": "residual", "residual": 1.2}}, "1.2: must be a finite real from -1"),
     ({"contact": {"residual": 0.5}}, "set memory = 'residual'"),
     ({"contact": {"memory": "residual", "side_1": [4, 6, 5]}}, "slider"),
     ({"contact": {"memory": "residual", "law": "rigid"}}, "use 'penalty' or 'dlft'"),
     ({"contact": {"memory": "residual"}, "case": {"analysis": "time"}}, "use 'frf' or 'point'"),
     ({"contact": {"memory": "residual"}, "sweep": {"stability": True}}, "leave stability out"),
     ({"sensitivity": {"parameters": "contact%residual"}}, "memory is not 'residual'"),
-    ({"sensitivity": {"parameters": "contact%slider_1"}}, "values of 0 serve"),
+    ({"sensitivity": {"parameters": "contact%slider_1"}},
+     "contact%slider_1 is not given: give it (values of 0 serve), or leave it out"),
 ])
 def test_refusals(change, words, tmp_path):
     groups = merged(slider(), change)
     if change.get("contact", {}).get("law") == "rigid":
         for key in ("tangential_stiffness", "normal_stiffness"):
             del groups["contact"][key]
-    assert words in run(tmp_path, groups, status=3).stderr
+    message = run(tmp_path, groups, status=3).stderr
+    assert words in message
+    # One mistake is told once.
+    assert message.count("error:") == 1
 
 
 def test_sweep_over_shares(tmp_path):
