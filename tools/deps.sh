@@ -14,10 +14,10 @@ for_what=${2:-all}
 run_packages=(numpy h5py matplotlib)
 python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pymetis pyarrow distributed bokeh
                 tqdm pint selenium pytest xdist gcovr nbclient ipykernel threadpoolctl mypy ruff
-                fortitude ford sphinx numpydoc myst_parser fpm)
+                fortitude ford sphinx numpydoc myst_parser yaml fpm)
 python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pymetis pyarrow distributed
                  bokeh tqdm pint selenium pytest pytest-xdist gcovr nbclient ipykernel
-                 threadpoolctl mypy ruff fortitude-lint ford sphinx numpydoc myst-parser fpm)
+                 threadpoolctl mypy ruff fortitude-lint ford sphinx numpydoc myst-parser pyyaml fpm)
 if [ "$for_what" = run ]; then
    python_modules=("${run_packages[@]}")
    python_packages=("${run_packages[@]}")

@@ -30,7 +30,7 @@ __all__ = ["KINDS", "Flank", "damper"]
 
 Floats = NDArray[np.float64]
 
-#: Of contact, as the key contact%law has them.
+#: The words of contact%law, to which a test holds them.
 LAWS = ("dlft", "dlft_velocity", "penalty", "rigid", "regularised", "iwan", "bouc_wen")
 KINDS = ("wedge", "cylinder", "strip", "split_ring", "mesh")
 #: Flanks of these lie at 90 degrees to the radial direction.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import warnings
@@ -16,6 +17,7 @@ from project import EXAMPLE, PROGRAM
 
 import fretwear as fw
 from fretwear._native import Session, unread_parts
+from fretwear.dampers import LAWS
 from fretwear.model import _CONTACT, _IN_NAMELIST, _LOADS, _SPRING
 from fretwear.sectors import _LOADS as OF_DIAMETERS
 from fretwear.sectors import _MATRICES
@@ -173,3 +175,9 @@ def test_unknown_parts_of_a_model_in_memory_are_refused(name: str, values: list[
             session.put(name, np.array(values, dtype=kind))
         with pytest.raises(fw.InputError, match=r"'titel' is no text part .*did you mean title"):
             session.put_texts("titel", ["x"])
+
+
+def test_laws_of_dampers_are_those_of_contact() -> None:
+    """The package names them itself, so that no program is asked before a damper is made."""
+    shown = subprocess.run([PROGRAM, "--keys=json"], check=True, capture_output=True, text=True)
+    assert set(LAWS) == set(json.loads(shown.stdout)["contact"]["keys"]["law"]["words"])
