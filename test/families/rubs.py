@@ -60,11 +60,7 @@ def drawn(seed):
     speed = np.zeros((pairs, 2))
     if events and random.random() < 0.5:
         sliding = "path"
-    if sliding == "path" and events:
-        speed[:, 0] = fast * random.choice([-1.0, 1.0])
-        if two:
-            speed[:, 1] = fast * random.uniform(-1.0, 1.0)
-    elif sliding == "steady" or random.random() < 0.8:
+    if events or sliding == "steady" or random.random() < 0.8:
         speed[:, 0] = fast * random.choice([-1.0, 1.0])
         if two:
             speed[:, 1] = fast * random.uniform(-1.0, 1.0)
