@@ -1,0 +1,161 @@
+"""The mass of bodies as a parameter of a travelling wave: `body%mass` of a sector, against
+differences of runs, against the whole annulus, and the best mass against a sweep."""
+import h5py
+import numpy as np
+import pytest
+from bodies import model_of
+from cases import run, with_model
+from test_bodies import SAME, TIGHT, annulus, at, sliding, solved
+
+import fretwear as fw
+
+#: Central differences of a relative step of 1e-4: 1e-8 of curvature, as much of round-off.
+STEP, DIFFERENT = 1e-4, 1e-6
+
+BY_MASS = {"parameters": ["body%mass"]}
+
+
+def slopes(path, quantity="first_harmonic"):
+    with h5py.File(path) as file:
+        return np.ravel(file[f"sensitivity/{quantity}/body_mass"][0])
+
+
+def values(path):
+    with h5py.File(path) as file:
+        return np.hypot(*file["coefficients"][0][1:3])
+
+
+def against_differences(model, folder, case, **parts):
+    """The derivative of a run and that of two runs with other masses; `parts` of the model file in
+    place of its own."""
+    model.to_hdf5(folder / "model.h5")
+    with h5py.File(folder / "model.h5", "r+") as file:
+        for name, part in parts.items():
+            if name in file:
+                del file[name]
+            file[name] = part
+    mass = float(model.bodies.mass[0])
+    run(folder, with_model(case))
+    slope = slopes(folder / "case.h5")
+    ends = []
+    for sign in (-1, 1):
+        run(folder, with_model(case | {"body": {"mass": [(1 + sign * STEP) * mass]}}))
+        ends.append(values(folder / "case.h5"))
+    difference = (ends[1] - ends[0]) / (2 * STEP * mass)
+    assert np.abs(difference).max() > 0.0
+    return np.abs(slope - difference).max() / np.abs(difference).max()
+
+
+def held(model, stiffness=2e4):
+    """Springs on the body, whose modes have damping then."""
+    K = np.array(model.K)
+    for dof in (4, 5):
+        K[dof, dof] += stiffness
+        K[dof, 0] -= 0.3 * stiffness
+        K[0, dof] -= 0.3 * stiffness
+    return K
+
+
+@pytest.mark.parametrize("order", [0, 1, 3, 2])
+def test_derivative_of_a_wave(order, tmp_path):
+    """Nodal diameters of both directions, those that stand, and harmonics of others of them."""
+    case = sliding(sectors=4, order=order)
+    groups = at(case["omega"], cyclic={"engine_order": order}, solver=TIGHT, sensitivity=BY_MASS)
+    groups["model"] |= {"rayleigh_mass": 0.3}
+    assert against_differences(model_of(case), tmp_path, groups) < DIFFERENT
+
+
+@pytest.mark.parametrize("wave", [False, True])
+def test_damping_of_modes_follows(wave, tmp_path):
+    """A body that springs hold is in modes, whose damping its mass changes."""
+    case = sliding(sectors=5, order=1) | {"wave": wave}
+    groups = at(case["omega"], solver=TIGHT, sensitivity=BY_MASS)
+    groups["model"] |= {"modal_damping": 0.1}
+    if wave:
+        groups["cyclic"] = {"engine_order": 1}
+    model = model_of(case)
+    assert against_differences(model, tmp_path, groups, stiffness=held(model)) < DIFFERENT
+
+
+def test_derivative_of_a_rotating_wave(tmp_path):
+    """Coriolis forces: Z is neither Hermitian nor the same for both directions."""
+    case = sliding(sectors=6, order=2)
+    model = model_of(case)
+    G = np.zeros_like(model.K)
+    G[0, 1], G[2, 3] = 0.1, -0.2
+    groups = at(case["omega"], cyclic={"engine_order": 2}, solver=TIGHT, sensitivity=BY_MASS)
+    assert against_differences(model, tmp_path, groups, coriolis=G - G.T) < DIFFERENT
+
+
+def test_derivative_of_the_annulus(tmp_path):
+    """All sectors and bodies as one structure have the derivatives of the wave."""
+    n = 4
+    case = sliding(sectors=n, order=1)
+    wave = model_of(case)
+    found = []
+    for name, model, more in (("wave", wave, {"cyclic": {"engine_order": 1}}),
+                              ("whole", annulus(case, wave, n, np.ones(n)), {})):
+        (tmp_path / name).mkdir()
+        solved(model, tmp_path / name, case["omega"], solver=TIGHT, sensitivity=BY_MASS, **more)
+        found.append(slopes(tmp_path / name / "case.h5"))
+    m = wave.n_dof
+    whole = found[1].reshape(-1)
+    for j in range(n):
+        of_sector = np.concatenate([whole[4 * j:4 * j + 4],
+                                    whole[4 * n + (m - 4) * j:4 * n + (m - 4) * (j + 1)]])
+        assert np.abs(of_sector - found[0]).max() < SAME * np.abs(whole).max()
+
+
+def ring(**more):
+    """Blades of a disk with a wedge between each two, and a sweep over their resonance."""
+    K = np.diag([13e3, 34e3, 13e3, 34e3]) - 4e3 * np.eye(4)[[2, 3, 0, 1]]
+    flanks = {"left": fw.Flank([[3, 4]] * 2, [[-0.01, 0.0], [-0.01, 0.004]]),
+              "right": fw.Flank([[1, 2]] * 2, [[0.01, 0.0], [0.01, 0.004]], sector=1)}
+    model = fw.damper(fw.Model(np.eye(4), 1e-3 * K, K, cosine=[8.0, 0.0, 0.0, 0.0],
+                               sectors=fw.Sectors(6), observe={"blade": 1}),
+                      "wedge", mass=0.006, inertia=6e-8, radius=0.2, angles=(50.0, 50.0), mu=0.3,
+                      tangential_stiffness=2e4, normal_stiffness=3e4, law="penalty", **flanks)
+    case = at(0.0) | {"case": {"analysis": "frf"}, "cyclic": {"engine_order": 1},
+                      "harmonics": {"n_harmonics": 3, "sampling": "events"},
+                      "sweep": {"start": 92.0, "end": 104.0, "n_points": 13}}
+    return model, case | more
+
+
+def top_of(result):
+    """The maximum of a polynomial through five rows about the largest."""
+    size = np.abs(result.harmonic(1, "blade"))
+    i = int(np.clip(size.argmax(), 2, len(size) - 3))
+    curve = np.polynomial.Polynomial.fit(result.omega[i - 2:i + 3], size[i - 2:i + 3], 4)
+    return curve(np.linspace(*result.omega[[i - 1, i + 1]], 2001)).max()
+
+
+def test_best_mass_of_a_wave(tmp_path):
+    """The smallest peak by the derivative, against those of 100 masses."""
+    model, groups = ring()
+    model.to_hdf5(tmp_path / "model.h5")
+    run(tmp_path, with_model(groups))
+    case = fw.Case.from_file(tmp_path / "case.nml")
+    found = fw.optimise(case, over="body%mass", minimise="max_first_harmonic[blade]",
+                        bounds=(0.004, 0.009))
+    masses = np.linspace(0.9, 1.1, 100) * found.values[0]
+    tops = [top_of(fw.run(case.replace(body={"mass": [mass]}))) for mass in masses]
+    assert abs(found.value / min(tops) - 1.0) < 1e-4
+    # Inside: the ends are higher.
+    assert 5 < np.argmin(tops) < 94 and min(tops[0], tops[-1]) > 1.001 * found.value
+
+
+def test_what_does_not_go(tmp_path):
+    """Refused in words, with a remedy."""
+    case = sliding(sectors=4, order=1)
+    model_of(case).to_hdf5(tmp_path / "model.h5")
+    wave = {"cyclic": {"engine_order": 1}}
+    groups = at(case["omega"], sensitivity=BY_MASS, **wave)
+    disk = groups | {"cyclic": {"engine_order": 1, "mistuned": True}}
+    message = run(tmp_path, with_model(disk), status=3).stderr
+    assert "mistuned disk" in message and "&body mass" in message
+    follows = groups | {"case": {"analysis": "frf"}, "model": {},
+                        "sweep": {"start": 60.0, "end": 80.0, "n_points": 3, "speed_order": 1.0}}
+    message = run(tmp_path, with_model(follows), status=3).stderr
+    assert "speed_order" in message and "rotation_speed" in message
+    other = groups | {"sensitivity": {"parameters": ["model%modal_damping"]}}
+    assert "not served" in run(tmp_path, with_model(other), status=3).stderr
