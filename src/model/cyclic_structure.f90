@@ -87,7 +87,7 @@ contains
 
    !> Condense a sector in the nodal diameters of the harmonics.
    subroutine new_cyclic_structure(model, relative, harmonic, omega_range, means, self, error, &
-                                   of_mode)
+                                   of_mode, keep_all, keep_none)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       !> Harmonics in use.
@@ -100,14 +100,21 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> For a nonlinear mode of about the highest frequency: nothing is condensed in harmonic 1.
       logical, intent(in), optional :: of_mode
-      logical :: keeps_first
+      !> Of matrices that change: every free dof is a coordinate, or no internal mode is, whatever a
+      !> harmonic may hit.
+      logical, intent(in), optional :: keep_all, keep_none
+      logical :: keeps_first, whole, none
 
       keeps_first = .false.
       if (present(of_mode)) keeps_first = of_mode
+      whole = allocated(model%cyclic%speed)
+      if (present(keep_all)) whole = whole .or. keep_all
+      none = .false.
+      if (present(keep_none)) none = keep_none
       call lay_out_coefficients(self, harmonic)
       self%n_relative = relative%n_coordinates
       self%n_observed = size(model%observe_matrix, 1)
-      call find_bases(model, relative, omega_range, keeps_first, self, error)
+      call find_bases(model, relative, omega_range, keeps_first, whole, none, self, error)
       if (allocated(error)) return
       ! With a speed that follows the frequency they would be those of one.
       if (.not. allocated(model%cyclic%speed)) call find_norms(self)
@@ -126,18 +133,18 @@ contains
    end subroutine find_norms
 
    !> A basis for each nodal diameter in use, with coordinates at places that all share.
-   subroutine find_bases(model, relative, omega_range, keeps_first, self, error)
+   subroutine find_bases(model, relative, omega_range, keeps_first, whole, none, self, error)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       real(wp), intent(in) :: omega_range(2)
-      logical, intent(in) :: keeps_first
+      !> In harmonic 1 every internal mode is a coordinate; every free dof is; nothing more is.
+      logical, intent(in) :: keeps_first, whole, none
       type(cyclic_structure), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices), allocatable :: nodal(:)
       type(nodal_speed) :: speed
       integer, allocatable :: used(:), slot(:)
       integer :: h, j, n_kept
-      logical :: follows
 
       call require_air(model, self, error)
       if (allocated(error)) return
@@ -147,7 +154,7 @@ contains
          call require_diameter(model, self, used(j), error)
          if (.not. allocated(error)) call sector_at(model, used(j), nodal(j), error)
          if (allocated(error)) return
-         if (allocated(model%cyclic%speed)) then
+         if (whole) then
             call self%basis(j)%keep_dofs(used(j), size(nodal(j)%mass, 1), relative%at(used(j) + 1))
             cycle
          end if
@@ -167,28 +174,27 @@ contains
                                             nodal(j)%has_whirl())
             cycle
          end if
-         call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range, &
-                                            nodal(j)%has_whirl(), nodal(j))
+         if (.not. none) call self%basis(j)%keep_resonances( &
+            pack(self%harmonic, self%basis_of == j), omega_range, nodal(j)%has_whirl(), nodal(j))
       end do
       ! Free dofs are those of all nodal diameters, modes are of one.
-      follows = allocated(model%cyclic%speed)
       n_kept = sum([(size(self%basis(j)%kept), j=1, size(used))])
-      if (follows) n_kept = maxval([(size(self%basis(j)%kept), j=1, size(used))])
+      if (whole) n_kept = maxval([(size(self%basis(j)%kept), j=1, size(used))])
       self%n_coordinates = self%n_relative + n_kept
-      self%kept = [(h, h=1, merge(n_kept, 0, follows))]
+      self%kept = [(h, h=1, merge(n_kept, 0, whole))]
       n_kept = 0
       do j = 1, size(used)
          slot = [relative%slots(used(j)), (self%n_relative + n_kept + h, &
                                           h=1, size(self%basis(j)%kept))]
-         if (follows) then
+         if (allocated(model%cyclic%speed)) then
             call speed_at(model, used(j), speed)
             call self%basis(j)%take_speed(speed, self%n_coordinates, slot)
-            call self%basis(j)%transform(nodal(j), slot, self%n_coordinates)
-            cycle
          end if
-         n_kept = n_kept + size(self%basis(j)%kept)
-         ! Numbers that tell nodal diameters apart too.
-         self%kept = [self%kept, used(j)*most_modes + self%basis(j)%kept]
+         if (.not. whole) then
+            n_kept = n_kept + size(self%basis(j)%kept)
+            ! Numbers that tell nodal diameters apart too.
+            self%kept = [self%kept, used(j)*most_modes + self%basis(j)%kept]
+         end if
          call transform(model, nodal(j), slot, self%n_coordinates, self%basis(j), error)
          if (allocated(error)) return
       end do

@@ -159,3 +159,79 @@ def test_what_does_not_go(tmp_path):
     assert "speed_order" in message and "rotation_speed" in message
     other = groups | {"sensitivity": {"parameters": ["model%modal_damping"]}}
     assert "not served" in run(tmp_path, with_model(other), status=3).stderr
+
+
+def rows_of(path):
+    with h5py.File(path) as file:
+        return file["coefficients"][()], file["contact/force"][()]
+
+
+@pytest.mark.parametrize("damping", [1.0, 0.0])
+@pytest.mark.parametrize("order", [1, 3])
+def test_sweep_over_the_mass(damping, order, tmp_path):
+    """A sweep over masses and the points of these, with damping and without: there all free dofs
+    are coordinates."""
+    case = sliding(sectors=4, order=order)
+    case["damping"] *= damping
+    model = model_of(case)
+    model.to_hdf5(tmp_path / "model.h5")
+    groups = at(case["omega"], cyclic={"engine_order": order}, solver=TIGHT)
+    mass = float(model.bodies.mass[0])
+    sweep = {"parameter": "body%mass", "frequency": case["omega"], "start": 0.8 * mass,
+             "end": 1.3 * mass, "n_points": 4}
+    for more in ({}, {"continuation": "arclength"}):
+        run(tmp_path, with_model(groups | {"case": {"analysis": "frf"}, "sweep": sweep | more}))
+        with h5py.File(tmp_path / "case.h5") as file:
+            masses = file["parameter"][()]
+        swept = rows_of(tmp_path / "case.h5")
+        for k in (0, len(masses) // 2, len(masses) - 1):
+            run(tmp_path, with_model(groups | {"body": {"mass": [float(masses[k])]}}))
+            for one, all_of_it in zip(rows_of(tmp_path / "case.h5"), swept):
+                assert np.abs(all_of_it[k] - one[0]).max() < SAME * np.abs(one[0]).max()
+
+
+@pytest.mark.parametrize("continuation", ["natural", "arclength"])
+def test_resonance_over_the_mass(continuation, tmp_path):
+    """Each resonance is the maximum over the frequency, or the phase, of a case of its mass."""
+    model, groups = ring()
+    model.to_hdf5(tmp_path / "model.h5")
+    condition = "phase" if continuation == "arclength" else "amplitude"
+    track = groups | {"case": {"analysis": "resonance"}, "solver": TIGHT, "resonance": {
+        "parameter": "body%mass", "start": 0.005, "end": 0.008, "n_points": 4,
+        "condition": condition, "continuation": continuation}}
+    run(tmp_path, with_model(track))
+    with h5py.File(tmp_path / "case.h5") as file:
+        rows = file["parameter"][()], file["omega"][()], file["coefficients"][()]
+    for mass, omega, found in list(zip(*rows))[::3]:
+        sizes = []
+        for part in (0.999, 1.0, 1.001):
+            run(tmp_path, with_model(groups | {
+                "case": {"analysis": "point"}, "sweep": {"start": part * float(omega)},
+                "body": {"mass": [float(mass)]}, "solver": TIGHT}))
+            with h5py.File(tmp_path / "case.h5") as file:
+                one = file["coefficients"][0]
+            sizes.append(np.hypot(*one[1:3, 0]))
+            if part == 1.0:
+                assert np.abs(found - one).max() < SAME * np.abs(one).max()
+        if condition == "amplitude":
+            assert sizes[1] > max(sizes[0], sizes[2])
+
+
+def test_damping_of_a_mode_by_mass(tmp_path):
+    """Self-excitation is in proportion to mass: of a mode that slips the derivative has both."""
+    case = sliding() | {"wave": False}
+    model = model_of(case)
+    model.to_hdf5(tmp_path / "model.h5")
+    mass = float(model.bodies.mass[0])
+    groups = at(0.0) | {"case": {"analysis": "mode"}, "sweep": {},
+                        "mode": {"number": 1, "start": 1e-4, "end": 2e-3, "n_points": 3},
+                        "solver": TIGHT, "sensitivity": BY_MASS}
+    said = {}
+    for part in (0.0, -STEP, STEP):
+        run(tmp_path, with_model(groups | {"body": {"mass": [(1.0 + part) * mass]}}))
+        with h5py.File(tmp_path / "case.h5") as file:
+            said[part] = [[file[f"sensitivity/{where}"][-1] for where in (
+                f"value/{of}", f"{of}/body_mass")] for of in ("mode_omega", "mode_damping_ratio")]
+    for k in (0, 1):
+        difference = (said[STEP][k][0] - said[-STEP][k][0]) / (2 * STEP * mass)
+        assert abs(said[0.0][k][1] - difference) < DIFFERENT * abs(difference)
