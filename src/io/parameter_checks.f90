@@ -53,7 +53,7 @@ contains
          if (case%elements%count_of(trim(group)) == 0) reason = 'there are no such elements: '// &
             'give group &'//trim(group)
       else if (is_of_matrices(number)) then
-         call check_of_matrices(case, number, reason)
+         call check_of_matrices(case, number, asked_by, reason)
       else if (is_of_sectors(number)) then
          call check_of_sectors(case, number, asked_by, reason)
       else
@@ -164,13 +164,14 @@ contains
    end subroutine check_of_assembly
 
    !> Matrices of a sector are not the parameter's own, but of its waves.
-   subroutine check_of_matrices(case, number, reason)
+   subroutine check_of_matrices(case, number, asked_by, reason)
       type(case_type), intent(in) :: case
       integer, intent(in) :: number
+      character(*), intent(in) :: asked_by
       character(:), allocatable, intent(out) :: reason
 
       if (number == body_mass .and. case%model%cyclic%is_cyclic) then
-         call check_of_waves(case, reason)
+         call check_of_waves(case, asked_by, reason)
          if (allocated(reason)) return
       else if (case%model%cyclic%is_alone) then
          reason = 'matrices that are not symmetric, or structural_damping, are not served with '// &
@@ -192,8 +193,9 @@ contains
    end subroutine check_of_matrices
 
    !> Where the mass of bodies is no parameter of a structure whose nodal diameters are balanced.
-   subroutine check_of_waves(case, reason)
+   subroutine check_of_waves(case, asked_by, reason)
       type(case_type), intent(in) :: case
+      character(*), intent(in) :: asked_by
       character(:), allocatable, intent(out) :: reason
 
       if (case%model%cyclic%is_mistuned) then
@@ -201,8 +203,8 @@ contains
       else if (allocated(case%model%cyclic%speed)) then
          reason = 'the load of the bodies follows the frequency (sweep%speed_order): give '// &
                   'model%rotation_speed'
-      else if (case%model%cyclic%has_nodal()) then
-         reason = 'matrices of nodal diameters are not served: run value by value (&body mass)'
+      else if (case%model%cyclic%has_nodal() .and. asked_by /= derived) then
+         reason = 'matrices of nodal diameters do not move: run value by value (&body mass)'
       end if
    end subroutine check_of_waves
 

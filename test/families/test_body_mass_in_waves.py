@@ -87,6 +87,27 @@ def test_derivative_of_a_rotating_wave(tmp_path):
     assert against_differences(model, tmp_path, groups, coriolis=G - G.T) < DIFFERENT
 
 
+@pytest.mark.parametrize("parts", ["coriolis", "structural_damping"])
+def test_matrices_without_sectors(parts, tmp_path):
+    """Matrices that are not real and symmetric, which are solved as those of a wave."""
+    case = sliding() | {"wave": False}
+    model = model_of(case)
+    G = np.zeros_like(model.K)
+    G[0, 1], G[2, 3] = 0.1, -0.2
+    part = {parts: G - G.T if parts == "coriolis" else 0.05 * np.array(model.K)}
+    groups = at(case["omega"], solver=TIGHT, sensitivity=BY_MASS)
+    assert against_differences(model, tmp_path, groups, **part) < DIFFERENT
+    mass = float(model.bodies.mass[0])
+    sweep = {"parameter": "body%mass", "frequency": case["omega"], "start": 0.9 * mass,
+             "end": 1.2 * mass, "n_points": 3}
+    plain = {name: keys for name, keys in groups.items() if name != "sensitivity"}
+    run(tmp_path, with_model(plain | {"case": {"analysis": "frf"}, "sweep": sweep}))
+    swept = rows_of(tmp_path / "case.h5")
+    run(tmp_path, with_model(plain | {"body": {"mass": [1.2 * mass]}}))
+    for one, all_of_it in zip(rows_of(tmp_path / "case.h5"), swept):
+        assert np.abs(all_of_it[-1] - one[0]).max() < SAME * np.abs(one[0]).max()
+
+
 def test_derivative_of_the_annulus(tmp_path):
     """All sectors and bodies as one structure have the derivatives of the wave."""
     n = 4
@@ -235,3 +256,36 @@ def test_damping_of_a_mode_by_mass(tmp_path):
     for k in (0, 1):
         difference = (said[STEP][k][0] - said[-STEP][k][0]) / (2 * STEP * mass)
         assert abs(said[0.0][k][1] - difference) < DIFFERENT * abs(difference)
+
+
+def test_derivative_of_nodal_diameters(tmp_path):
+    """Matrices of nodal diameters, with damping of modes of a body that springs hold, have the
+    derivatives of the sector that they are of."""
+    case = sliding(sectors=4, order=1)
+    model = model_of(case)
+    groups = at(case["omega"], cyclic={"engine_order": 1}, solver=TIGHT, sensitivity=BY_MASS)
+    groups["model"] |= {"modal_damping": 0.1}
+    # Without an interface a sector is the same in every nodal diameter.
+    parts = {name: np.stack([np.array(matrix), 0.0 * model.M], -1) for name, matrix in (
+        ("mass", model.M), ("stiffness", held(model)), ("damping", model.C))}
+    model.to_hdf5(tmp_path / "model.h5")
+    with h5py.File(tmp_path / "model.h5", "r+") as file:
+        for name, part in parts.items():
+            del file[name]
+            file[name] = part[..., 0]
+    run(tmp_path, with_model(groups))
+    wanted = slopes(tmp_path / "case.h5")
+    with h5py.File(tmp_path / "model.h5", "r+") as file:
+        file["cyclic"].attrs["n_physical"] = model.n_dof
+        for name, part in parts.items():
+            del file[name]
+            for k in range(3):
+                file[f"nodal_diameter/{k}/{name}"] = part
+    run(tmp_path, with_model(groups))
+    assert np.abs(slopes(tmp_path / "case.h5") - wanted).max() < SAME * np.abs(wanted).max()
+    sweep = {"parameter": "body%mass", "frequency": case["omega"], "start": 0.01, "end": 0.02,
+             "n_points": 3}
+    moved = groups | {"case": {"analysis": "frf"}, "sweep": sweep}
+    del moved["sensitivity"]
+    message = run(tmp_path, with_model(moved), status=3).stderr
+    assert "nodal diameters do not move" in message and "&body mass" in message
