@@ -6,6 +6,9 @@
 from __future__ import annotations
 
 import argparse
+import os
+import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -114,6 +117,83 @@ def optimum(run: Runs, folder: Path) -> list[str]:
                 f"{float(found.value):.5e} at {float(found.values[0]):.5f}.", ""]
 
 
+def sector(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass, stiffness and load of a blade in a sector: nodes of its left and its right side."""
+    n = 2 * nodes
+    along = 2e4 * (n * np.eye(n) - np.ones((n, n)))
+    stiffness = np.kron(along, np.eye(2))
+    stiffness += np.kron(np.diag(1.0 + 0.02 * np.arange(n)), np.diag([9e3, 2e4])) / n
+    return np.eye(2 * n) / n, stiffness, np.tile([8.0 / n, 0.0], n)
+
+
+def strip(mass: float, by_rows: bool) -> fw.Model:
+    """A strip under four nodes that does not turn, made by `fretwear.damper`, which acts on rows,
+    or with dofs alone."""
+    M, K, load = sector(2)
+    common = {"sectors": fw.Sectors(12), "observe": {"blade": 1}}
+    if by_rows:
+        return fw.damper(fw.Model(M, 1e-3 * K, K, cosine=load, **common),  # type: ignore[arg-type]
+                         "strip", mass=mass, radius=0.2, angles=(90.0, 90.0), mu=0.3,
+                         tangential_stiffness=TANGENTIAL, normal_stiffness=NORMAL, law="penalty",
+                         left=fw.Flank([[5, 6], [7, 8]], [[-0.01, 0.0], [-0.01, 0.004]]),
+                         right=fw.Flank([[1, 2], [3, 4]], [[0.01, 0.0], [0.01, 0.004]], sector=1))
+    M, K = (np.pad(matrix, (0, 2)) for matrix in (M, K))
+    M[8:, 8:] = mass * np.eye(2)
+    pairs = fw.ContactPairs(side_1=[[9, 0, -10]] * 4, mu=0.3, tangential_stiffness=TANGENTIAL,
+                            side_2=[[5, 0, -6], [7, 0, -8], [1, 0, -2], [3, 0, -4]],
+                            sector_2=[0, 0, 1, 1], normal_stiffness=NORMAL, law="penalty")
+    return fw.Model(M, 1e-3 * K, K, cosine=np.append(load, [0.0, 0.0]), contact=pairs,
+                    static=np.eye(10)[9] * mass * 0.2 * 100.0**2,
+                    **common)  # type: ignore[arg-type]
+
+
+def shroud() -> fw.Model:
+    """Four pairs between neighbouring blades, without a body."""
+    M, K, load = sector(4)
+    press = np.zeros(16)
+    press[9::2], press[1:8:2] = -9.8, 9.8
+    pairs = fw.ContactPairs(side_1=[[9 + 2 * i, 0, 10 + 2 * i] for i in range(4)],
+                            side_2=[[1 + 2 * i, 0, 2 + 2 * i] for i in range(4)], sector_2=[1] * 4,
+                            mu=0.3, tangential_stiffness=TANGENTIAL, normal_stiffness=NORMAL,
+                            law="penalty")
+    return fw.Model(M, 1e-3 * K, K, cosine=load, static=press, sectors=fw.Sectors(12),
+                    observe={"blade": 1}, contact=pairs)
+
+
+def effort(program: Path, folder: Path) -> list[str]:
+    """Work and time of a wave with a body, against the same without rows and a shroud."""
+    cases = {"strip, by rows": (strip(0.003, True), 100.0),
+             "strip, by dofs": (strip(0.003, False), 0.0),
+             "shroud, no body": (shroud(), 0.0)}
+    times: dict[str, list[float]] = {name: [] for name in cases}
+    counts = {}
+    alone = {**os.environ, "OMP_NUM_THREADS": "1"}
+    # In turn, so that a busy machine is as busy for each.
+    for _ in range(5):
+        for name, (model, speed) in cases.items():
+            model.to_hdf5(folder / "sector.h5")
+            keys = {"case": {"analysis": "frf"},
+                    "model": {"source": "hdf5", "file": "sector.h5"}, "cyclic": {"engine_order": 2},
+                    "harmonics": {"n_harmonics": 7}, "solver": {"tolerance": 1e-9},
+                    "sweep": {"start": 85.0, "end": 125.0, "n_points": 1001}}
+            if speed > 0.0:
+                keys["model"]["rotation_speed"] = speed
+            (folder / "wave.nml").write_text(write_namelist(keys))
+            before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+            done = subprocess.run([program, "wave.nml"], cwd=folder, capture_output=True,
+                                  text=True, check=False, env=alone)
+            if done.returncode != 0:
+                raise SystemExit(f"{name}: {done.stderr}")
+            times[name].append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
+            counts[name] = [re.search(pattern, done.stdout) for pattern in
+                            (r"iterations +(\d+)", r"(\d+) Krylov")]
+    least = min(times["strip, by dofs"])
+    rows = [f"| {name} | {' | '.join(count[1] for count in counts[name] if count)} | "
+            f"{min(times[name]) / least:.2f} |" for name in cases]
+    return ["", "| 1001 points, 7 harmonics, 4 pairs | steps of Newton | iterations of GMRES | "
+                "time |", "|---|---|---|---|", *rows, ""]
+
+
 def main() -> int:
     """Measure, and write the sections of the document."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -125,6 +205,7 @@ def main() -> int:
         run = Runs(options.build.resolve() / "fw_run", folder)
         write_section("performance", performance(run), options.output)
         write_section("optimum", optimum(run, folder), options.output)
+        write_section("effort", effort(options.build.resolve() / "fw_run", folder), options.output)
         picture = options.output.parent / "images" / "damper.png"
         plot_damper(run(wedge(0.02), 100.0)).savefig(picture, dpi=90)
     return 0

@@ -66,7 +66,7 @@ module fw_parameter_slopes
       type(fourier_type) :: fourier
       integer, allocatable :: column(:)
       !> Observed quantities where all coordinates rest (n_observed, n_retained), and the field of
-      !> the solution (whole_size, n_retained), where the structure knows it.
+      !> the solution (whole_size, n_retained).
       complex(wp), allocatable :: at_rest(:, :), field(:, :)
       !> The motion (n_coordinates * n_coefficients).
       real(wp), allocatable :: x(:)
@@ -124,7 +124,7 @@ contains
          call find_work_at_rest(self, state)
       end if
       associate (problem => state%problem, m => state%problem%structure%n_coordinates)
-         if (wants_all .and. problem%structure%knows_field) then
+         if (wants_all) then
             allocate (q(m, problem%fourier%n_retained))
             call amplitudes_of(problem%fourier%harmonic, problem%fourier%column, m, x, m, q)
             call problem%structure%complete_field(state%structure_state, q, field=self%field)

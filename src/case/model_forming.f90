@@ -17,9 +17,11 @@ module fw_model_forming
    public :: model_origin, find_changes, form_structure, form_matrices, finish_structure
    public :: goes_alone
 
-   !> Step of the difference of the modal damping over the stiffness. Of fourth order: its error
+   !> Step of the difference of the modal damping over stiffness or mass. Of fourth order: its error
    !> is the fourth power of the step, and what it makes of round-off is as small.
    real(wp), parameter :: step = 1.0e-3_wp
+   integer, parameter :: place(4) = [-2, -1, 1, 2]
+   real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp]/12.0_wp
 
    !> What a model is made of, to make it again with other options.
    type :: model_origin
@@ -189,7 +191,7 @@ contains
          call add_modal_damping(model%mass, model%stiffness, options%modal_damping, &
                                 model%damping, error, 2.0_wp*pi*options%modal_damping_up_to)
       end if
-      if (model%cyclic%is_cyclic .or. allocated(error)) return
+      if (allocated(error)) return
       call find_changes(options, raw, wanted, model, error)
    end subroutine finish_structure
 
@@ -219,6 +221,8 @@ contains
       integer :: k
 
       parameters = pack(wanted, is_of_matrices(wanted))
+      ! Of waves no other change is taken to the nodal diameters.
+      if (model%cyclic%is_cyclic) parameters = pack(parameters, parameters == body_mass)
       if (size(parameters) == 0) return
       allocate (changes(size(parameters)))
       do k = 1, size(parameters)
@@ -268,10 +272,32 @@ contains
          end do
          change%damping = options%rayleigh_mass*change%mass
          ! Without bodies it is refused later, in words.
-         if (raw%bodies%count() > 0) change%value = raw%bodies%mass(1)
+         if (raw%bodies%count() == 0) return
+         change%value = raw%bodies%mass(1)
+         if (options%modal_damping > 0.0_wp .and. .not. model%cyclic%is_cyclic) then
+            call follow_mass(options, model, change, error)
+         end if
       case default ! changes no matrix
       end select
    end subroutine find_change
+
+   !> What the damping of modes has of the mass, of which `change` holds the derivative.
+   subroutine follow_mass(options, model, change, error)
+      type(model_options), intent(in) :: options
+      type(model_type), intent(in) :: model
+      type(matrix_change), intent(inout) :: change
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: h
+      integer :: k
+
+      h = step*change%value
+      do k = 1, size(place)
+         call add_modal_damping(model%mass + place(k)*h*change%mass, model%stiffness, &
+                                weight(k)/h*options%modal_damping, change%damping, error, &
+                                2.0_wp*pi*options%modal_damping_up_to)
+         if (allocated(error)) return
+      end do
+   end subroutine follow_mass
 
    !> d/d Omega of K + Omega**2 K_r, of the load likewise, and of the damping that follows K.
    subroutine change_by_speed(options, raw, model, change, error)
@@ -304,8 +330,6 @@ contains
       !> Grows by the derivative.
       real(wp), intent(inout) :: damping(:, :)
       type(error_type), allocatable, intent(out) :: error
-      integer, parameter :: place(4) = [-2, -1, 1, 2]
-      real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp]/12.0_wp
       real(wp), allocatable :: stiffness(:, :)
       real(wp) :: h, speed
       integer :: k, n

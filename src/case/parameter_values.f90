@@ -167,6 +167,10 @@ contains
       real(wp), intent(in) :: value
       type(error_type), allocatable, intent(out) :: error
 
+      if (case%model%cyclic%is_cyclic) then
+         call put_mass(value, case)
+         return
+      end if
       associate (options => case%origin%options)
          select case (number)
          case (modal_damping); options%modal_damping = value
@@ -186,5 +190,22 @@ contains
                              case%model, error)
       end associate
    end subroutine put_of_matrices
+
+   !> The mass of bodies in a wave, on which matrices and load depend in proportion: what else they
+   !> hold by the speed, by directions of their own or by damping stays as it was formed.
+   pure subroutine put_mass(value, case)
+      real(wp), intent(in) :: value
+      class(body_type), intent(inout) :: case
+      integer :: k
+
+      k = findloc(case%model%changes%parameter, body_mass, dim=1)
+      associate (m => case%model, change => case%model%changes(k))
+         m%mass = m%mass + (value - change%value)*change%mass
+         m%damping = m%damping + (value - change%value)*change%damping
+         m%load_static = m%load_static + (value - change%value)*change%load_static
+         change%value = value
+      end associate
+      if (allocated(case%bodies)) case%bodies%mass = value
+   end subroutine put_mass
 
 end module fw_parameter_values

@@ -8,13 +8,15 @@ module fw_moved_structure
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_body, only: body_type
+   use fw_cyclic_structure, only: cyclic_structure, new_cyclic_structure
    use fw_error, only: error_type
+   use fw_joint, only: joint_type
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_parameter_values, only: put_parameter
    use fw_plain_structure, only: new_plain_structure, plain_structure
    use fw_reduction, only: may_resonate_between, new_reduction, reduction_type
-   use fw_relative, only: relative_type
+   use fw_sector_means, only: means_none, means_split
    use fw_structure_operator, only: structure_state
    implicit none (type, external)
    private
@@ -37,9 +39,9 @@ contains
    end subroutine put_fullest
 
    !> Whether a mode that the contact holds may be met between the ends of the values.
-   subroutine meets_modes(body, relative, harmonic, range, meets, error)
+   subroutine meets_modes(body, joint, harmonic, range, meets, error)
       class(body_type), intent(in) :: body
-      type(relative_type), intent(in) :: relative
+      type(joint_type), intent(in) :: joint
       integer, intent(in) :: harmonic(:)
       !> [rad/s]
       real(wp), intent(in) :: range(2)
@@ -54,12 +56,36 @@ contains
       do k = 1, 2
          call put_parameter(moved, body%varied, body%varied_span(k:k), error)
          if (allocated(error)) return
-         call new_reduction(moved%model, relative, harmonic, range, basis(k), error, &
+         if (moved%model%cyclic%is_cyclic) then
+            call has_undamped(moved%model, joint, harmonic, meets, error)
+            if (meets .or. allocated(error)) return
+            cycle
+         end if
+         call new_reduction(moved%model, joint%relative, harmonic, range, basis(k), error, &
                             keep_none=.true.)
          if (allocated(error)) return
       end do
-      meets = may_resonate_between(basis(1), basis(2), harmonic, range)
+      if (.not. moved%model%cyclic%is_cyclic) meets = may_resonate_between(basis(1), basis(2), &
+                                                                           harmonic, range)
    end subroutine meets_modes
+
+   !> Whether any nodal diameter of a wave has modes without damping, wherever they are: with the
+   !> parameter they may come to a harmonic.
+   subroutine has_undamped(model, joint, harmonic, has, error)
+      type(model_type), intent(in) :: model
+      type(joint_type), intent(in) :: joint
+      integer, intent(in) :: harmonic(:)
+      logical, intent(out) :: has
+      type(error_type), allocatable, intent(out) :: error
+      !> [rad/s]
+      real(wp), parameter :: everywhere(2) = [0.0_wp, 1.0e100_wp]
+      type(cyclic_structure) :: cyclic
+
+      has = .false.
+      call new_cyclic_structure(model, joint%cyclic, harmonic, everywhere, means_none, cyclic, &
+                                error)
+      if (.not. allocated(error)) has = size(cyclic%kept) > 0
+   end subroutine has_undamped
 
    !> Bring the structure of a state's problem to the matrices of a model. Rigid laws take their eps
    !> from it, as a case of its own would, unless they are to hold it.
@@ -103,7 +129,18 @@ contains
       type(balance_problem), intent(inout) :: problem
       type(error_type), allocatable, intent(out) :: error
       type(plain_structure), allocatable :: plain
+      type(cyclic_structure), allocatable :: cyclic
 
+      if (model%cyclic%is_cyclic) then
+         allocate (cyclic)
+         call new_cyclic_structure(model, problem%joint%cyclic, problem%fourier%harmonic, &
+                                   problem%origin%range, merge(means_split, means_none, &
+                                                               take_balance(problem)), &
+                                   cyclic, error, keep_all=keeps_all, &
+                                   keep_none=.not. problem%origin%keeps_all)
+         if (.not. allocated(error)) call move_alloc(cyclic, problem%structure)
+         return
+      end if
       allocate (plain)
       if (keeps_all) then
          call new_plain_structure(model, problem%joint%relative, problem%fourier%harmonic, &

@@ -181,7 +181,7 @@ contains
       keeps_all = .false.
       if (present(keep_all)) keeps_all = keep_all
       if (is_of_matrices(case%varied) .and. .not. keeps_all) then
-         call meets_modes(case, joint%relative, fourier%harmonic, range, keeps_all, error)
+         call meets_modes(case, joint, fourier%harmonic, range, keeps_all, error)
          if (allocated(error)) return
       end if
       if (is_of_matrices(case%varied)) then
@@ -247,7 +247,9 @@ contains
       end if
       allocate (cyclic)
       call new_cyclic_structure(case%model, joint%cyclic, fourier%harmonic, range, means, cyclic, &
-                                error, of_mode=analyses(case%analysis)%is_free)
+                                error, of_mode=analyses(case%analysis)%is_free, &
+                                keep_all=is_of_matrices(case%varied) .and. keep_all, &
+                                keep_none=is_of_matrices(case%varied))
       call move_alloc(cyclic, structure)
    end subroutine new_structure
 

@@ -53,7 +53,7 @@ contains
          if (case%elements%count_of(trim(group)) == 0) reason = 'there are no such elements: '// &
             'give group &'//trim(group)
       else if (is_of_matrices(number)) then
-         call check_of_matrices(case, number, reason)
+         call check_of_matrices(case, number, asked_by, reason)
       else if (is_of_sectors(number)) then
          call check_of_sectors(case, number, asked_by, reason)
       else
@@ -164,17 +164,23 @@ contains
    end subroutine check_of_assembly
 
    !> Matrices of a sector are not the parameter's own, but of its waves.
-   subroutine check_of_matrices(case, number, reason)
+   subroutine check_of_matrices(case, number, asked_by, reason)
       type(case_type), intent(in) :: case
       integer, intent(in) :: number
+      character(*), intent(in) :: asked_by
       character(:), allocatable, intent(out) :: reason
 
-      if (case%model%cyclic%is_alone) then
+      if (number == body_mass .and. case%model%cyclic%is_cyclic) then
+         call check_of_waves(case, asked_by, reason)
+         if (allocated(reason)) return
+      else if (case%model%cyclic%is_alone) then
          reason = 'matrices that are not symmetric, or structural_damping, are not served with '// &
                   'it yet: run value by value'
       else if (case%model%cyclic%is_cyclic) then
          reason = 'matrices of a cyclic structure (&cyclic) are not served yet'
-      else if (number == body_mass .and. .not. allocated(case%bodies)) then
+      end if
+      if (allocated(reason)) return
+      if (number == body_mass .and. .not. allocated(case%bodies)) then
          reason = 'the model has no bodies (/body): make it with fretwear.damper'
       else if (number == body_mass .and. .not. are_alike(case)) then
          reason = 'the bodies of the model have several masses: give all the same by &body mass'
@@ -185,6 +191,22 @@ contains
                   'value by value'
       end if
    end subroutine check_of_matrices
+
+   !> Where the mass of bodies is no parameter of a structure whose nodal diameters are balanced.
+   subroutine check_of_waves(case, asked_by, reason)
+      type(case_type), intent(in) :: case
+      character(*), intent(in) :: asked_by
+      character(:), allocatable, intent(out) :: reason
+
+      if (case%model%cyclic%is_mistuned) then
+         reason = 'the sectors of a mistuned disk are not served: run value by value (&body mass)'
+      else if (allocated(case%model%cyclic%speed)) then
+         reason = 'the load of the bodies follows the frequency (sweep%speed_order): give '// &
+                  'model%rotation_speed'
+      else if (case%model%cyclic%has_nodal() .and. asked_by /= derived) then
+         reason = 'matrices of nodal diameters do not move: run value by value (&body mass)'
+      end if
+   end subroutine check_of_waves
 
    !> Whether one mass is that of all bodies.
    pure logical function are_alike(case)

@@ -9,7 +9,7 @@ module fw_read_case
    use fw_laws, only: law_words, usual_law
    use fw_load_terms, only: load_terms
    use fw_raw_model, only: raw_model
-   use fw_model_forming, only: form_structure
+   use fw_model_forming, only: find_changes, form_structure
    use fw_model_keys, only: model_options
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
@@ -388,8 +388,13 @@ contains
          if (all(case%origin%wanted /= case%varied)) then
             case%origin%wanted = [case%origin%wanted, case%varied]
          end if
-         call form_structure(case%origin%options, case%origin%raw, case%origin%static, &
-                             case%origin%wanted, case%model, error)
+         if (case%model%cyclic%is_cyclic) then
+            call find_changes(case%origin%options, case%origin%raw, case%origin%wanted, &
+                              case%model, error)
+         else
+            call form_structure(case%origin%options, case%origin%raw, case%origin%static, &
+                                case%origin%wanted, case%model, error)
+         end if
          if (allocated(error)) return
       end if
       if (is_of_matrices(case%varied)) then

@@ -15,7 +15,8 @@ module fw_read_model
    use fw_model, only: model_type
    use fw_model_file, only: read_model_hdf5
    use fw_raw_model, only: raw_model
-   use fw_model_forming, only: finish_structure, form_matrices, goes_alone, model_origin
+   use fw_model_forming, only: find_changes, finish_structure, form_matrices, goes_alone, &
+      model_origin
    use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_n_rows, bind_rows, &
       bind_loads, bind_table, source_words, source_inline, source_hdf5, source_matrix_market, &
       source_memory
@@ -407,6 +408,7 @@ contains
          if (allocated(raw%table_scale)) call reader%refuse('load', 'n_table', 'does not go '// &
             'with matrices of nodal diameters: give a load that holds at all frequencies')
          call finish_nodal(reader, options, raw, static, model, error)
+         if (.not. allocated(error)) call find_changes(options, raw, wanted, model, error)
          return
       end if
       call check_parts(reader, raw, options%source == source_inline)

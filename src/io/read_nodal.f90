@@ -51,6 +51,8 @@ contains
       end do
       call stand_in(options, raw, model)
       model%cyclic%loss_factor = options%loss_factor
+      ! It is in the damping of each; the mass of bodies changes it.
+      model%cyclic%modal_damping = options%modal_damping
    end subroutine finish_nodal
 
    !> Rows of stress of every nodal diameter, or of none; what is asked for by displacements alone

@@ -275,8 +275,10 @@ contains
                if (b%loss > 0.0_wp) slope(:, h) = cmplx(1.0_wp, b%loss, wp)*slope(:, h)
                slope(:, h) = slope(:, h) + cmplx(0.0_wp, self%harmonic(h)*state%omega, wp)* &
                              matmul(b%change_c(:, :, number), field(:, h))
+               ! With the self-excitation of a mode, which is in proportion to mass.
                if (allocated(b%change_m)) slope(:, h) = slope(:, h) - &
-                  (self%harmonic(h)*state%omega)**2*matmul(b%change_m(:, :, number), field(:, h))
+                  cmplx((self%harmonic(h)*state%omega)**2, self%harmonic(h)*state%omega* &
+                        state%self_excitation, wp)*matmul(b%change_m(:, :, number), field(:, h))
             end if
          end do
       end associate

@@ -11,6 +11,9 @@ module fw_cyclic_structure
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_sector, only: sector_at, speed_at
+   use fw_sector_changes, only: changes_at, nodal_change
+   use fw_sector_field, only: change_sector, complete_sector, condense_sector, observe_sector, &
+      work_on_sector
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
    use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, &
@@ -63,6 +66,12 @@ module fw_cyclic_structure
       procedure :: observed_slope
       procedure :: load_work
       procedure :: structural_work
+      procedure :: whole_size
+      procedure :: condense_field
+      procedure :: complete_field
+      procedure :: observe_field
+      procedure :: change_field
+      procedure :: field_work
    end type cyclic_structure
 
    !> Blocks of one frequency.
@@ -78,7 +87,7 @@ contains
 
    !> Condense a sector in the nodal diameters of the harmonics.
    subroutine new_cyclic_structure(model, relative, harmonic, omega_range, means, self, error, &
-                                   of_mode)
+                                   of_mode, keep_all, keep_none)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       !> Harmonics in use.
@@ -91,14 +100,21 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> For a nonlinear mode of about the highest frequency: nothing is condensed in harmonic 1.
       logical, intent(in), optional :: of_mode
-      logical :: keeps_first
+      !> Of matrices that change: every free dof is a coordinate, or no internal mode is, whatever a
+      !> harmonic may hit.
+      logical, intent(in), optional :: keep_all, keep_none
+      logical :: keeps_first, whole, none
 
       keeps_first = .false.
       if (present(of_mode)) keeps_first = of_mode
+      whole = allocated(model%cyclic%speed)
+      if (present(keep_all)) whole = whole .or. keep_all
+      none = .false.
+      if (present(keep_none)) none = keep_none
       call lay_out_coefficients(self, harmonic)
       self%n_relative = relative%n_coordinates
       self%n_observed = size(model%observe_matrix, 1)
-      call find_bases(model, relative, omega_range, keeps_first, self, error)
+      call find_bases(model, relative, omega_range, keeps_first, whole, none, self, error)
       if (allocated(error)) return
       ! With a speed that follows the frequency they would be those of one.
       if (.not. allocated(model%cyclic%speed)) call find_norms(self)
@@ -117,18 +133,18 @@ contains
    end subroutine find_norms
 
    !> A basis for each nodal diameter in use, with coordinates at places that all share.
-   subroutine find_bases(model, relative, omega_range, keeps_first, self, error)
+   subroutine find_bases(model, relative, omega_range, keeps_first, whole, none, self, error)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       real(wp), intent(in) :: omega_range(2)
-      logical, intent(in) :: keeps_first
+      !> In harmonic 1 every internal mode is a coordinate; every free dof is; nothing more is.
+      logical, intent(in) :: keeps_first, whole, none
       type(cyclic_structure), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices), allocatable :: nodal(:)
       type(nodal_speed) :: speed
       integer, allocatable :: used(:), slot(:)
       integer :: h, j, n_kept
-      logical :: follows
 
       call require_air(model, self, error)
       if (allocated(error)) return
@@ -138,7 +154,7 @@ contains
          call require_diameter(model, self, used(j), error)
          if (.not. allocated(error)) call sector_at(model, used(j), nodal(j), error)
          if (allocated(error)) return
-         if (allocated(model%cyclic%speed)) then
+         if (whole) then
             call self%basis(j)%keep_dofs(used(j), size(nodal(j)%mass, 1), relative%at(used(j) + 1))
             cycle
          end if
@@ -158,31 +174,46 @@ contains
                                             nodal(j)%has_whirl())
             cycle
          end if
-         call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range, &
-                                            nodal(j)%has_whirl(), nodal(j))
+         if (.not. none) call self%basis(j)%keep_resonances( &
+            pack(self%harmonic, self%basis_of == j), omega_range, nodal(j)%has_whirl(), nodal(j))
       end do
       ! Free dofs are those of all nodal diameters, modes are of one.
-      follows = allocated(model%cyclic%speed)
       n_kept = sum([(size(self%basis(j)%kept), j=1, size(used))])
-      if (follows) n_kept = maxval([(size(self%basis(j)%kept), j=1, size(used))])
+      if (whole) n_kept = maxval([(size(self%basis(j)%kept), j=1, size(used))])
       self%n_coordinates = self%n_relative + n_kept
-      self%kept = [(h, h=1, merge(n_kept, 0, follows))]
+      self%kept = [(h, h=1, merge(n_kept, 0, whole))]
       n_kept = 0
       do j = 1, size(used)
          slot = [relative%slots(used(j)), (self%n_relative + n_kept + h, &
                                           h=1, size(self%basis(j)%kept))]
-         if (follows) then
+         if (allocated(model%cyclic%speed)) then
             call speed_at(model, used(j), speed)
             call self%basis(j)%take_speed(speed, self%n_coordinates, slot)
-            call self%basis(j)%transform(nodal(j), slot, self%n_coordinates)
-            cycle
          end if
-         n_kept = n_kept + size(self%basis(j)%kept)
-         ! Numbers that tell nodal diameters apart too.
-         self%kept = [self%kept, used(j)*most_modes + self%basis(j)%kept]
-         call self%basis(j)%transform(nodal(j), slot, self%n_coordinates)
+         if (.not. whole) then
+            n_kept = n_kept + size(self%basis(j)%kept)
+            ! Numbers that tell nodal diameters apart too.
+            self%kept = [self%kept, used(j)*most_modes + self%basis(j)%kept]
+         end if
+         call transform(model, nodal(j), slot, self%n_coordinates, self%basis(j), error)
+         if (allocated(error)) return
       end do
    end subroutine find_bases
+
+   !> All blocks of a nodal diameter, with what parameters change of them.
+   subroutine transform(model, nodal, slot, n_coordinates, basis, error)
+      type(model_type), intent(in) :: model
+      type(nodal_matrices), intent(in) :: nodal
+      !> See transform of sector_reduction.
+      integer, intent(in) :: slot(:), n_coordinates
+      type(sector_reduction), intent(inout) :: basis
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_change), allocatable :: changes(:)
+
+      if (allocated(model%changes)) call changes_at(model, basis%nodal_diameter, nodal, changes, &
+                                                    error)
+      if (.not. allocated(error)) call basis%transform(nodal, slot, n_coordinates, changes)
+   end subroutine transform
 
    !> Nodal diameters of the harmonics, 0 to N/2, and which harmonics take their conjugates.
    subroutine list_diameters(model, self, used)
@@ -644,5 +675,99 @@ contains
          end do
       end select
    end function structural_work
+
+   !> Coordinates, and as many condensed unknowns as any nodal diameter has.
+   pure integer function whole_size(self)
+      class(cyclic_structure), intent(in) :: self
+
+      whole_size = self%n_coordinates + maxval(self%basis%n_internal)
+   end function whole_size
+
+   subroutine condense_field(self, state, field, load)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: load(:, :)
+      integer :: h
+
+      select type (state)
+      type is (cyclic_state)
+         do h = 1, size(self%harmonic)
+            call condense_sector(self%basis(self%basis_of(h)), state%point(h), field(:, h), &
+                                 load(:, h))
+         end do
+      end select
+   end subroutine condense_field
+
+   subroutine complete_field(self, state, q, load, field)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp), intent(in), optional :: load(:, :)
+      complex(wp), intent(out) :: field(:, :)
+      integer :: h
+
+      select type (state)
+      type is (cyclic_state)
+         do h = 1, size(self%harmonic)
+            associate (basis => self%basis(self%basis_of(h)), factor => state%load_factor(h))
+               if (present(load)) then
+                  call complete_sector(basis, state%point(h), factor, q(:, h), field(:, h), &
+                                       load(:, h))
+               else
+                  call complete_sector(basis, state%point(h), factor, q(:, h), field(:, h))
+               end if
+            end associate
+         end do
+      end select
+   end subroutine complete_field
+
+   !> Of sector 0.
+   pure subroutine observe_field(self, field, observed)
+      class(cyclic_structure), intent(in) :: self
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: observed(:, :)
+      integer :: h
+
+      do h = 1, size(self%harmonic)
+         call observe_sector(self%basis(self%basis_of(h)), harmonic_point( &
+                             harmonic=self%harmonic(h), conjugated=self%conjugated(h)), &
+                             field(:, h), observed(:, h))
+      end do
+   end subroutine observe_field
+
+   pure subroutine change_field(self, state, number, field, slope)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: number
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: slope(:, :)
+      integer :: h
+
+      select type (state)
+      type is (cyclic_state)
+         do h = 1, size(self%harmonic)
+            call change_sector(self%basis(self%basis_of(h)), state%point(h), &
+                               state%load_factor(h), number, field(:, h), slope(:, h))
+         end do
+      end select
+   end subroutine change_field
+
+   !> Work of the loads of harmonic 1.
+   pure complex(wp) function field_work(self, state, field) result(work)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: field(:, :)
+      integer :: h
+
+      work = (0.0_wp, 0.0_wp)
+      h = findloc(self%harmonic, 1, dim=1)
+      if (h == 0) return
+      select type (state)
+      type is (cyclic_state)
+         work = work_on_sector(self%basis(self%basis_of(h)), state%point(h), &
+                               state%load_factor(h), field(:, h))
+      end select
+   end function field_work
 
 end module fw_cyclic_structure

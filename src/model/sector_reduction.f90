@@ -12,6 +12,7 @@ module fw_sector_reduction
    use fw_kinds, only: wp
    use fw_lapack, only: zpotrs
    use fw_load_waves, only: load_waves
+   use fw_sector_changes, only: nodal_change
    use fw_sector_relative, only: sector_relative
    use fw_text, only: to_text
    implicit none (type, external)
@@ -48,6 +49,10 @@ module fw_sector_reduction
       type(nodal_speed), allocatable :: speed
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       complex(wp), allocatable :: observe_q(:, :), observe_i(:, :)
+      !> What parameters change of M, C and the static load, of coordinates and internal modes
+      !> together (m + n_internal, m + n_internal, n_changes), (m + n_internal, n_changes); not
+      !> allocated where none is asked for.
+      complex(wp), allocatable :: change_m(:, :, :), change_c(:, :, :), change_load(:, :)
       !> Coordinates that this nodal diameter does not have (n_coordinates).
       logical, allocatable :: padded(:)
       !> Numbers of the internal modes that became coordinates.
@@ -285,12 +290,14 @@ contains
    end function pushes_free_mode
 
    !> All blocks in the basis, with coordinates at the places that all nodal diameters share.
-   subroutine transform(self, nodal, slot, n_coordinates)
+   subroutine transform(self, nodal, slot, n_coordinates, changes)
       class(sector_reduction), intent(inout) :: self
       type(nodal_matrices), intent(in) :: nodal
       !> Place of each coordinate of this nodal diameter, kept modes behind the relative ones.
       integer, intent(in) :: slot(:)
       integer, intent(in) :: n_coordinates
+      !> What parameters change of this nodal diameter.
+      type(nodal_change), intent(in), optional :: changes(:)
       complex(wp), allocatable :: t_q(:, :)
       integer :: j
 
@@ -315,8 +322,31 @@ contains
       self%observe_q = product_of(nodal%observe, self%t_q)
       self%observe_i = product_of(nodal%observe, self%t_i)
       if (nodal%has_whirl()) call take_whirl(nodal, self)
+      if (present(changes)) call take_changes(changes, self)
       deallocate (self%t_q, self%t_i)
    end subroutine transform
+
+   !> Changes in the whole basis. It spans all motions, so that its own dependence on the parameters
+   !> changes no solution.
+   subroutine take_changes(changes, self)
+      type(nodal_change), intent(in) :: changes(:)
+      type(sector_reduction), intent(inout) :: self
+      complex(wp), allocatable :: t(:, :)
+      integer :: k, m, n
+
+      m = self%n_coordinates
+      n = m + self%n_internal
+      allocate (t(size(self%t_q, 1), n))
+      t(:, :m) = self%t_q
+      t(:, m + 1:) = self%t_i
+      allocate (self%change_m(n, n, size(changes)), self%change_load(n, size(changes)))
+      allocate (self%change_c, mold=self%change_m)
+      do k = 1, size(changes)
+         self%change_m(:, :, k) = congruence(t, changes(k)%mass, t)
+         self%change_c(:, :, k) = congruence(t, changes(k)%damping, t)
+         self%change_load(:, k) = matmul(changes(k)%load, conjg(t))
+      end do
+   end subroutine take_changes
 
    !> Coriolis matrix and stiffness of the air in the whole basis.
    subroutine take_whirl(nodal, self)

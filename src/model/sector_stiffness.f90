@@ -15,6 +15,7 @@ module fw_sector_stiffness
 
    public :: harmonic_point, slopes_of, form_sector, derive_sector, recover_sector
    public :: observed_by_sector, observed_sector_slope, work_of_sector, answer_of_modes
+   public :: add_whirl, combine_rows, factor_internal, load_of, turned
 
    !> Where a harmonic stands: factors of K, M and C in Z = k K - theta M + i s C.
    type :: harmonic_point

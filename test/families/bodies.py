@@ -21,14 +21,21 @@ the angles. It moves the points by formulas of its own (no rows), marches fricti
 instant, and wants the forces of the result, and the balance of every harmonic with them, each
 within 1e-7 of the largest force and load. A case whose load no friction can balance has to be
 refused before any point, and no other; the judge asks a linear program of SciPy.
+
+The derivatives of all first harmonics by the mass of the bodies (`body%mass`) are held against
+central differences of two runs each (1e-4 of the largest; of two steps the nearer one, as an
+instant may switch between the runs).
 """
 COUNT = 200
 SMALL = (0, 1, 2, 3, 4, 5, 6, 7)
 COLUMNS = {"solved": "solved", "failed": "ended in words", "refused": "refused", "force":
-           "forces off", "balance": "balance off", "wrong": "refused or taken wrongly"}
-ZERO = ("force", "balance", "wrong")
+           "forces off", "balance": "balance off", "wrong": "refused or taken wrongly",
+           "slope": "derivative off"}
+ZERO = ("force", "balance", "wrong", "slope")
 
 HARMONICS, INSTANTS, WITHIN = 5, 128, 1e-7
+#: Differences of these steps: round-off of the solver leaves 1e-6 of the larger ones.
+STEPS, SLOPE = (1e-5, 1e-6), 1e-4
 
 
 def drawn(seed):
@@ -225,18 +232,44 @@ def judged(case, u, said, variant=""):
     return np.abs(told - of_pairs).max() / size, worst / max(size, np.abs(load).max())
 
 
-def run_of(case, program, folder):
+def run_of(case, program, folder, **more):
     model_of(case).to_hdf5(folder / "model.h5")
     groups = {
         "case": {"analysis": "point"},
         "model": {"source": "hdf5", "file": "model.h5", "rotation_speed": SPEED},
         "harmonics": {"n_harmonics": HARMONICS, "n_time": INSTANTS, "sampling": "uniform"},
-        "sweep": {"start": case["omega"]}, "solver": {"tolerance": 1e-11}}
+        "sweep": {"start": case["omega"]}, "solver": {"tolerance": 1e-11}} | more
     if case["wave"]:
         groups["cyclic"] = {"engine_order": case["order"]}
     (folder / "case.nml").write_text(namelist_text(groups))
     return subprocess.run([program, "-q", "case.nml"], cwd=folder, capture_output=True, text=True,
                           check=False)
+
+
+def slope_off(case, program, folder):
+    """How far the derivatives by the mass are from differences, beside the largest; none where a
+    run ends in words."""
+    mass, tight = case["pressing"] / RADIUS / SPEED**2, {"solver": {"tolerance": 1e-12}}
+
+    def first(name, **more):
+        done = run_of(case, program, folder, **tight, **more)
+        with h5py.File(folder / "case.h5") as file:
+            return None if done.returncode else np.array(file[name][0])
+
+    slope = first("sensitivity/first_harmonic/body_mass",
+                  sensitivity={"parameters": ["body%mass"]})
+    if slope is None:
+        return 0.0
+    off = []
+    for step in STEPS:
+        ends = [first("coefficients", body={"mass": [(1.0 + side * step) * mass]})
+                for side in (-1, 1)]
+        if ends[0] is None or ends[1] is None:
+            continue
+        difference = np.subtract(*(np.hypot(end[1], end[2]) for end in ends[::-1])) / (
+            2.0 * step * mass)
+        off.append(np.abs(slope.ravel() - difference).max() / np.abs(difference).max())
+    return min(off, default=0.0)
 
 
 def trial(seed, program, folder):
@@ -257,4 +290,8 @@ def trial(seed, program, folder):
     found["force"], found["balance"] = int(force > WITHIN), int(balance > WITHIN)
     if found["force"] + found["balance"]:
         found["notes"].append(f"forces off by {force:.1e}, balance by {balance:.1e}")
+    slope = slope_off(case, program, folder)
+    found["slope"] = int(slope > SLOPE)
+    if found["slope"]:
+        found["notes"].append(f"derivative off by {slope:.1e}")
     return found
