@@ -6,17 +6,19 @@
 !> T being the identity but for the right interface, which is no coordinate any more. Where the
 !> model holds matrices of nodal diameters, T is the identity of the physical coordinates.
 module fw_sector
+   use fw_closed_joint, only: closed_joint
    use fw_cyclic_data, only: nodal_matrices, nodal_speed
    use fw_damping, only: add_modal_damping
    use fw_error, only: error_type
    use fw_hermitian, only: complex_part, real_form
    use fw_kinds, only: wp
    use fw_model, only: model_type
+   use fw_sector_relative, only: held_basis, new_sector_relative, sector_relative
    use fw_side, only: terms_of
    implicit none (type, external)
    private
 
-   public :: sector_at, speed_at, sector_rows, damp_modes, add_sector_spring
+   public :: sector_at, speed_at, sector_rows, damp_modes, add_sector_spring, close_sector
 
 contains
 
@@ -258,6 +260,32 @@ contains
          end associate
       end do
    end subroutine add_side
+
+   !> A joint closed in nodal diameter k: its springs join the stiffness; where rows are held, there
+   !> is a basis of the motions that leave them alone.
+   subroutine close_sector(model, joint, k, stiffness, basis)
+      type(model_type), intent(in) :: model
+      type(closed_joint), intent(in) :: joint
+      integer, intent(in) :: k
+      !> Hermitian (n, n).
+      complex(wp), intent(inout) :: stiffness(:, :)
+      !> (n, n - n_held), not allocated where nothing is held.
+      complex(wp), allocatable, intent(out) :: basis(:, :)
+      type(sector_relative) :: relative
+      complex(wp), allocatable :: rows(:, :)
+      integer :: i
+
+      if (joint%n_rows() == 0) return
+      call sector_rows(model, k, joint%side_1, joint%side_2, joint%sector_2, rows)
+      do i = 1, joint%n_rows()
+         if (.not. joint%is_held(i)) call add_sector_spring(rows(i, :), joint%stiffness(i), &
+                                                            stiffness)
+      end do
+      if (.not. any(joint%is_held)) return
+      rows = rows(pack([(i, i=1, joint%n_rows())], joint%is_held), :)
+      call new_sector_relative(rows, relative)
+      call held_basis(relative, size(stiffness, 1), basis)
+   end subroutine close_sector
 
    !> stiffness + row^H coefficient row; the row holds the first coordinates.
    pure subroutine add_sector_spring(row, coefficient, stiffness)
