@@ -169,6 +169,9 @@ module fw_remark_table
       remark_kind('no mode', &
                   'no natural frequency of the free, sliding or stuck structure lies in the '// &
                   'sweep: often Hz typed for rad/s'), &
+      remark_kind('repeated mode', &
+                  'analysis = ''ringdown'': another mode has the frequency of the one that is '// &
+                  'released, and its shape is one of many'), &
       remark_kind('undetermined mode', &
                   'a harmonic meets, to round-off, a mode without damping that no load '// &
                   'reaches, of the structure alone or (up to 400 dofs) with linear springs '// &

@@ -8,12 +8,17 @@ module fw_model_keys
 
    public :: model_options
    public :: source_words, source_inline, source_hdf5, source_matrix_market, source_memory
+   public :: damping_of_stuck
    public :: bind_order, bind_matrices, bind_n_rows, bind_rows, bind_loads, bind_table
 
    character(*), parameter :: source_words(*) = &
       [character(13) :: 'inline', 'hdf5', 'matrix_market', 'memory']
    integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3, &
                          source_memory = 4
+
+   !> Of which modes the modal damping is.
+   character(*), parameter :: damping_words(*) = [character(5) :: 'open', 'stuck']
+   integer, parameter :: damping_of_open = 1, damping_of_stuck = 2
 
    !> More dofs are taken for a mistake: the matrices are dense.
    integer, parameter :: largest = 100000
@@ -29,6 +34,7 @@ module fw_model_keys
       real(wp) :: rayleigh_stiffness = 0.0_wp
       !> Fraction of critical damping of every mode.
       real(wp) :: modal_damping = 0.0_wp
+      integer :: modal_damping_of = damping_of_open
       !> Highest frequency of the modes that are damped so [Hz] (0: all are).
       real(wp) :: modal_damping_up_to = 0.0_wp
       !> [rad/s]
@@ -147,8 +153,11 @@ contains
                          unit='1/s'), self%rayleigh_mass)
       call keys%bind(key('rayleigh_stiffness', 'adds this times K, with rotation, to the '// &
                          'damping', at_least(0.0_wp), unit='s'), self%rayleigh_stiffness)
-      call keys%bind(key('modal_damping', 'fraction of critical damping of every mode with '// &
-                         'open contact', at_least(0.0_wp)), self%modal_damping)
+      call keys%bind(key('modal_damping', 'fraction of critical damping of every mode', &
+                         at_least(0.0_wp)), self%modal_damping)
+      call keys%bind_word(key('modal_damping_of', "modes with open contact, or with all pairs "// &
+                              "stuck: `closed` of analysis 'modes'", only='modal_damping'), &
+                          self%modal_damping_of, damping_words)
       call keys%bind(key('modal_damping_up_to', 'of modes up to this frequency alone, which '// &
                          'takes less time; 0: of all', at_least(0.0_wp), unit='Hz', &
                          only='modal_damping'), self%modal_damping_up_to)
