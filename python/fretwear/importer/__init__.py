@@ -28,6 +28,7 @@ from .build import (
     save,
 )
 from .calculix import Job, deck_loads, find_job, supports_of
+from .ccx import add_ccx_arguments, ccx_files
 from .checks import check_model
 from .contact import add_contact_arguments, pairs_of_options
 from .deck import Deck, read_deck
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "which way the wave of --engine-order runs, and -o is written too")
     parser.add_argument("--engine-order", type=int, metavar="M",
                         help="of the picture of --check (default: 1)")
+    add_ccx_arguments(parser)
     for role in ROLES:
         parser.add_argument("--" + role.replace("_", "-"), metavar="FILE[#NAME]",
                             type=Source.of, help=f"{role.replace('_', ' ')} matrix")
@@ -167,6 +169,7 @@ def main(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.absolute().parent.is_dir():
         raise OutputError(f"no folder to write {options.output} into")
     chosen_engine(options.factor)   # refused before the work
+    options.files = ccx_files(options)
     model = _read(options)
     found = [note if isinstance(note, Finding) else Finding("note", "files", note)
              for note in model.notes] + check_model(model, options.factor)
