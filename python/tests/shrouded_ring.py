@@ -53,6 +53,8 @@ class Ring:
         How far inner nodes of both sides of a crack are from each other, within its plane.
     shift : float
         The same of its outlines.
+    wide : bool
+        Whether blades touch their neighbours too, so that cracks end at the rim of the disk.
     """
 
     lines: range
@@ -60,13 +62,14 @@ class Ring:
     gap: float = 0.0
     differ: float = 0.0
     shift: float = 0.0
+    wide: bool = False
     nodes: list[Node] = field(init=False)
 
     def __post_init__(self) -> None:
         cells = [[self._node(i, j, k, corner) for corner in CORNERS.tolist()]
                  for i in self.lines for j in range(3) for k in range(2)
                  # Blades are two cells wide.
-                 if j != 1 or i % 4 in (0, 3)]
+                 if self.wide or j != 1 or i % 4 in (0, 3)]
         self.nodes = sorted({node for cell in cells for node in cell})
         place = {node: k for k, node in enumerate(self.nodes)}
         self.cells = np.array([[place[node] for node in cell] for cell in cells])
@@ -105,9 +108,9 @@ class Ring:
 
     def quads(self, side: int, line: int) -> np.ndarray:
         """The faces there, anticlockwise from outside."""
-        order = ((2, 0), (2, 1), (3, 1), (3, 0))
-        faces = [[self.nodes.index((line, j, k + step, side)) for j, step in order]
-                 for k in range(2)]
+        faces = [[self.nodes.index((line, j, k + step, side if j >= 2 else 0)) for j, step in
+                  ((low, 0), (low, 1), (low + 1, 1), (low + 1, 0))]
+                 for low in ((1, 2) if self.wide else (2,)) for k in range(2)]
         return np.array(faces if side == 1 else [face[::-1] for face in faces])
 
     def write(self, folder: Path, loads: dict[str, np.ndarray]) -> list[str]:
@@ -128,8 +131,13 @@ class Ring:
                  "*ELEMENT, TYPE=C3D8, ELSET=ALL", *(
                      ", ".join(map(str, [k + 1, *(cell + 1)])) for k, cell in
                      enumerate(self.cells))]
-        for name, chosen in (("RIGHT", [k for k, node in enumerate(self.nodes) if node[3] == 1]),
-                             ("LEFT", [k for k, node in enumerate(self.nodes) if node[3] == -1]),
+        tips = {side: {k for k, node in enumerate(self.nodes) if self.wide and node[1] == 1
+                       and any(other[0] == node[0] and other[3] == side for other in self.nodes)}
+                for side in (1, -1)}
+        for name, chosen in (("RIGHT", [k for k, node in enumerate(self.nodes)
+                                        if node[3] == 1 or k in tips[1]]),
+                             ("LEFT", [k for k, node in enumerate(self.nodes)
+                                       if node[3] == -1 or k in tips[-1]]),
                              ("BLADE", [k for k, node in enumerate(self.nodes)
                                         if node[1] in (1, 2) and node[0] % 4 == 1])):
             lines += [f"*NSET, NSET={name}", ", ".join(str(k + 1) for k in chosen)]

@@ -256,6 +256,19 @@ def test_shrouds_that_match_are_not_tied(tmp_path: Path) -> None:
     assert (tmp_path / "wave.png").stat().st_size > 5000
 
 
+def test_crack_that_ends_at_a_tied_face(tmp_path: Path) -> None:
+    """Nodes at its end are of surfaces that touch, and of the tied face too."""
+    end = ["--reduce", "130", "--by-diameter"]
+    found = {}
+    for name, ring, option in (("cracks", through_cracks(*SIZES, True), "--contact-neighbour"),
+                               ("blades", through_blades(*SIZES, True), "--contact")):
+        found[name] = imported(write(ring, tmp_path / name), tmp_path / f"{name}.h5", option,
+                               "RIGHT", "LEFT", "--reach", "5", *end)
+    for k in range(N // 2 + 1):
+        one, two = (by_diameter(path, k) for path in found.values())
+        assert np.abs((one - two) / np.abs(one).max(axis=1)[:, None]).max() <= EXACT
+
+
 def test_what_is_refused(files: dict[str, list[str]], tmp_path: Path,
                          capsys: pytest.CaptureFixture[str]) -> None:
     end = ["--reduce", "5", "--by-diameter", "-o", str(tmp_path / "x.h5")]
@@ -267,7 +280,8 @@ def test_what_is_refused(files: dict[str, list[str]], tmp_path: Path,
     words = refused("--contact-neighbour", "RIGHT", "BLADE", "--reach", "1")
     assert "BLADE of the" in words and "sector" in words
     assert (tmp_path / "x_contact_refused.png").stat().st_size > 5000
-    assert "face each other nowhere" in refused("--contact", "RIGHT", "LEFT", "--reach", "1")
+    words = refused("--contact", "RIGHT", "LEFT", "--reach", "1")
+    assert "face each other nowhere" in words and "of the next sector: --contact-neighbour" in words
     assert "global axes" in refused("--contact-neighbour", "RIGHT", "LEFT", "--frames",
                                     "cylindrical")
     alone = [word for word in files["cracks"] if word not in ("--sectors", str(N))]

@@ -4,7 +4,7 @@ sectors: `--contact-neighbour`."""
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -81,11 +81,11 @@ def pairs_of_options(options: argparse.Namespace, dofs: Dofs, job: Path | None =
                          "the surfaces")
     deck = read_named(file)
     turn = None
-    if options.contact_neighbour:
-        if options.sectors is None or options.sectors < 2:
-            raise InputError("--contact-neighbour needs --sectors N, at least 2: surface 2 is that "
-                             "of a neighbouring sector")
+    if options.sectors is not None and options.sectors > 1:
         turn = rotation(options.axis, 2.0 * np.pi / options.sectors)
+    elif options.contact_neighbour:
+        raise InputError("--contact-neighbour needs --sectors N, at least 2: surface 2 is that of "
+                         "a neighbouring sector")
     couples = [Couple(one, two) for one, two in options.contact]
     if options.deck_contact:
         couples += deck.couples
@@ -138,7 +138,7 @@ def pairs_of_surfaces(deck: NamedMesh, couples: Sequence[Couple], dofs: Dofs, *,
     n_inside : int, optional
         So many couples are of one sector, the others of neighbours; all of one without it.
     turn : (3, 3), optional
-        Rotation from a sector to the next, for these others.
+        Rotation from a sector to the next, of a model of a sector.
 
     Returns
     -------
@@ -166,20 +166,37 @@ def pairs_of_surfaces(deck: NamedMesh, couples: Sequence[Couple], dofs: Dofs, *,
                  along: Sequence[float] | None = along) -> SurfacePairs:
             return contact_pairs(first, second, reach=reach, thickness=thickness, tangent=along)
 
+        inside = turn is None or n_inside is None or number < n_inside
         try:
-            if turn is None or n_inside is None or number < n_inside:
-                pairs = make(one, two)
-                facing = Facing(pairs, pairs.matrix, sp.csr_array(pairs.matrix.shape), 0)
-            else:
-                facing = facing_neighbour(one, two, turn, make)
+            facing = _facing(one, two, None if inside else turn, make)
         except RefusedSurfaces as error:
-            if picture is None:
-                raise
-            error.args = (f"{error}; see {error.save(picture)}",)
+            seen = "" if picture is None else f"; see {error.save(picture)}"
+            error.args = (f"{error}{_elsewhere(one, two, turn, make) if inside else ''}{seen}",)
             raise
         notes.append(_said(facing.pairs))
         found.append(facing)
     return _joined(deck, couples, found, dofs, mu, notes), notes
+
+
+def _facing(one: Surface, two: Surface, turn: Floats | None,
+            make: Callable[[Surface, Surface], SurfacePairs]) -> Facing:
+    """Pairs of surfaces of one sector, or of neighbours by the rotation between them."""
+    if turn is not None:
+        return facing_neighbour(one, two, turn, make)
+    pairs = make(one, two)
+    return Facing(pairs, pairs.matrix, sp.csr_array(pairs.matrix.shape), 0)
+
+
+def _elsewhere(one: Surface, two: Surface, turn: Floats | None,
+               make: Callable[[Surface, Surface], SurfacePairs]) -> str:
+    """Where refused surfaces of a sector face each other, if it is in neighbouring ones."""
+    if turn is None:
+        return ""
+    try:
+        names = facing_neighbour(one, two, turn, make).pairs.names
+    except InputError:
+        return ""
+    return f"; {names[0]} faces {names[1]}: --contact-neighbour {one.name} {two.name}"
 
 
 def _said(pairs: SurfacePairs) -> str:
