@@ -145,7 +145,8 @@ def _lines(path: Path, mesh: GmshMesh,
     yield _MARK + path.name
     yield "*NODE"
     for node, (x, y, z) in zip(mesh.nodes[used].tolist(), mesh.points[used].tolist()):
-        yield f"{node}, {x:.16g}, {y:.16g}, {z:.16g}"
+        # Of a number CalculiX reads 20 characters, and refuses what is longer.
+        yield f"{node}, {x:.13e}, {y:.13e}, {z:.13e}"
     for kind, table, numbers in solids:
         yield f"*ELEMENT, TYPE={_SOLIDS[kind]}"
         for number, row in zip(numbers.tolist(), mesh.nodes[table].tolist()):
@@ -213,8 +214,8 @@ def _sections(path: Path, mesh: GmshMesh, cells: Ints,
     for number, (name, members) in enumerate(parts, 1):
         young, poisson, density = materials[name]
         yield from _set("ELSET", f"FRETWEAR_{number}", members)
-        yield from (f"*MATERIAL, NAME=FRETWEAR_{number}", "*ELASTIC", f"{young!r}, {poisson!r}",
-                    "*DENSITY", f"{density!r}",
+        yield from (f"*MATERIAL, NAME=FRETWEAR_{number}", "*ELASTIC",
+                    f"{young:.12g}, {poisson:.12g}", "*DENSITY", f"{density:.12g}",
                     f"*SOLID SECTION, ELSET=FRETWEAR_{number}, MATERIAL=FRETWEAR_{number}")
 
 
@@ -235,8 +236,10 @@ def _run(deck: Path, folder: Path, shown: Path, quiet: bool) -> None:
     missing = [end for end in SUFFIXES if not deck.with_suffix(end).is_file()]
     if done.returncode or missing:
         said = (done.stdout + done.stderr).splitlines()
-        first = next((k for k, line in enumerate(said) if "*ERROR" in line), len(said) - _QUOTED)
-        quoted = " ".join(line.strip() for line in said[max(first, 0):max(first, 0) + _QUOTED])
-        raise InputError(f"ccx {shown.stem}: status {done.returncode}"
-                         + (f", no {', '.join(missing)}: has the deck a step with *FREQUENCY, "
-                            "SOLVER=MATRIXSTORAGE?" if missing else "") + f" It said: {quoted}")
+        first = next((k for k, line in enumerate(said) if "*ERROR" in line), None)
+        if first is None and missing and not done.returncode:
+            raise InputError(f"ccx {shown.stem}: stored no {', '.join(missing)}; the deck needs a "
+                             "step with *FREQUENCY, SOLVER=MATRIXSTORAGE")
+        part = said[-_QUOTED:] if first is None else said[first:first + _QUOTED]
+        raise InputError(f"ccx {shown.stem}: status {done.returncode}; it said: "
+                         + " ".join(line.strip() for line in part))
