@@ -132,7 +132,8 @@ def index_page(docs: Path) -> str:
                                   (docs / "keys.md").read_text(encoding="utf-8"), re.DOTALL):
         heading = _heading_before(docs / "keys.md", f"<!-- keys of {group} -->")
         keys += [f"* [`{key}`](keys.md#{heading}) of `&{group}`"
-                 for key in re.findall(r"^\| `(\w+)` \|", rows, re.MULTILINE)]
+                 for cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", rows, re.MULTILINE)
+                 for key in re.findall(r"\w+", cell)]
     messages = []
     heading = ""
     for line in (docs / "messages.md").read_text(encoding="utf-8").splitlines():
