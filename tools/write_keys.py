@@ -146,15 +146,27 @@ def said(program: str, option: str) -> str:
         text = first_clause(text) if option == "--remarks" else text.split(". Exit status")[0]
         text = code.sub(lambda found: f"`{compact(found[0])}`", text)
         words = name.split(" ")
-        begins = " ".join(words[:MESSAGE]) + (" ..." if words[MESSAGE:] not in ([], ["..."]) else "")
-        rows.append(f"| `{begins if len(words) > MESSAGE + 1 else name}` | {text}")
+        if len(words) > MESSAGE + 1:
+            name = " ".join([*words[:MESSAGE], "..."])
+        rows.append(f"| `{name}` | {text}")
     return "\n".join(rows)
 
 
+#: Where a remark is made, before it says what of.
+WHERE = re.compile(r"(?:wear|campbell|bounds|population|&\w+|\w+ = '\w+'|fw_run --explain): ")
+
+#: Words that hardly say what of.
+FEW = 6
+
+
 def first_clause(text: str) -> str:
-    """Without parentheses and what follows a semicolon or the first sentence."""
+    """Without parentheses and what follows a semicolon, a colon or the first sentence."""
     text = re.sub(r" \((?![xyz])[^()]*(?:\([^()]*\)[^()]*)*\)", "", text)
-    return re.split(r"; |\. (?=[A-Z])", text)[0].removesuffix(".")
+    start = found.end() if (found := WHERE.match(text)) else 0
+    first, *rest = re.split(r"[;:] |\. (?=[A-Z])", text[start:])
+    if rest and len(first.split()) < FEW:
+        first = f"{first}: {rest[0]}"
+    return text[:start] + first.removesuffix(".")
 
 
 def compact(setting: str) -> str:
