@@ -78,17 +78,23 @@ def rules(program: str) -> str:
             needs.setdefault(asks, []).append(found[1])
         else:
             refuses.setdefault(asks, []).append(forbids)
-    rows = [f"| {quoted(asks)} | {cell(needs, asks)} | {cell(refuses, asks)}"
+    rows = [f"| {quoted(asks)} | {cell(needs, asks)} | {cell(refuses, asks)}".rstrip()
             for asks in dict.fromkeys(askers)]
     return "\n".join(["| what | needs | does not go with", "|---|---|---", *rows])
 
 
 def cell(found: dict[str, list[str]], asks: str) -> str:
-    return quoted(", ".join(found.get(asks, ["-"])))
+    return quoted(", ".join(found.get(asks, [])))
 
 
 #: Parts that have the name of a key and are something else.
 OWN_PARTS = ("gap_harmonic",)
+
+
+def home(name: str) -> str:
+    """The group of a part as Markdown names it; an attribute has a home of its own."""
+    path = name.split("`")[1]
+    return f"{path}@" if " attribute " in name else path.rpartition("/")[0]
 
 
 def parts(program: str, groups: Keys) -> str:
@@ -108,7 +114,9 @@ def parts(program: str, groups: Keys) -> str:
         path = name.split("`")[1]
         group, _, last_name = path.removeprefix("/").rpartition("/")
         keys = groups.get(group or "model", {}).get("keys", {})
-        of_key = last_name in keys and " attribute " not in name and last_name not in OWN_PARTS
+        attribute = name.split("`")[3] if " attribute " in name else ""
+        keys = groups.get(path.strip("/") or "model", {}).get("keys", {}) if attribute else keys
+        of_key = (attribute or last_name) in keys and last_name not in OWN_PARTS
         if of_key:
             text = "key"
         if required := required.strip():
@@ -118,9 +126,9 @@ def parts(program: str, groups: Keys) -> str:
         text = re.sub(r"; law = `.*", "", text)
         last = rows[-1] if rows else ("", "", "")
         same = next((k for k, row in enumerate(rows) if of_key and row[1:] == (shape, text)
-                     and row[0].split("`")[1].rpartition("/")[0] == path.rpartition("/")[0]), None)
+                     and home(row[0]) == home(name)), None)
         if same is not None:
-            rows[same] = (f"{rows[same][0]}, `{last_name}`", shape, text)
+            rows[same] = (f"{rows[same][0]}, `{attribute or last_name}`", shape, text)
         elif shape == last[1] and "attribute" not in name and text in ("likewise", last[2]):
             rows[-1] = (f"{last[0]}, `{last_name}`", shape, last[2])
         else:
@@ -256,7 +264,7 @@ def meaning(key: dict[str, Any]) -> str:
 TOGETHER = 3
 
 
-def table(group: str, keys: dict[str, Any], parameters: str) -> str:
+def table(group: str, keys: dict[str, Any], parameters: list[str]) -> str:
     """The keys of a group as Markdown: those without condition, then those of each condition.
 
     The long list of parameters stands in `sweep%parameter` alone.
@@ -265,8 +273,8 @@ def table(group: str, keys: dict[str, Any], parameters: str) -> str:
     conditions = [condition(key, group) for key in keys.values()]
     for (name, key), only in zip(keys.items(), conditions):
         words = accepts(key)
-        if group != "sweep":
-            words = words.replace(parameters, "of `sweep%parameter`")
+        if group != "sweep" and key.get("words", [])[-len(parameters):] == parameters:
+            words = f"`{key['default']}`, and others of `sweep%parameter`"
         values = "; ".join(filter(None, (default(key), words)))
         text = meaning(key)
         apart = conditions.count(only) >= TOGETHER
@@ -288,7 +296,7 @@ def table(group: str, keys: dict[str, Any], parameters: str) -> str:
 def tables(groups: Keys, program: str) -> dict[str, tuple[str, str]]:
     """What stands between two marks: {first mark: (last mark, lines)}."""
     words = groups["sweep"]["keys"]["parameter"]["words"]
-    parameters = ", ".join(f"`'{word}'`" for word in words if word != "frequency")
+    parameters = [word for word in words if word != "frequency"]
     found = {f"keys of {group}": ("end of keys", table(group, content["keys"], parameters))
              for group, content in groups.items()}
     return found | {"parts of a model file": ("end of parts", parts(program, groups)),
