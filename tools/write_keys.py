@@ -163,6 +163,8 @@ def said(program: str, option: str) -> str:
 #: Where a remark is made, before it says what of.
 WHERE = re.compile(r"(?:wear|campbell|bounds|population|&\w+|\w+ = '\w+'|fw_run --explain): ")
 
+#: What follows a remark as its reason.
+REASON = re.compile(r", (?:as|so that|even|however|which) ")
 #: Words that hardly say what of.
 FEW = 6
 
@@ -174,7 +176,7 @@ def first_clause(text: str) -> str:
     first, *rest = re.split(r"[;:] |\. (?=[A-Z])", text[start:])
     if rest and len(first.split()) < FEW:
         first = f"{first}: {rest[0]}"
-    return text[:start] + first.removesuffix(".")
+    return text[:start] + REASON.split(first)[0].removesuffix(".")
 
 
 def compact(setting: str) -> str:
