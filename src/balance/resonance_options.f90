@@ -74,13 +74,15 @@ contains
                          from_to(2, most_points)), self%n_points)
       call keys%bind_word(key('spacing', 'even steps, or in the logarithm'), self%spacing, &
                           spacing_words)
-      call keys%bind_word(key('as', 'values, or factors of those of the case (all pairs or springs together)'), &
-                              self%as, as_words)
+      call keys%bind_word(key('as', &
+                              'values, or factors of those of the case (all pairs or springs '// &
+                              'together)'), self%as, as_words)
       call keys%bind_word(key('condition', 'the response is largest, or the load does no '// &
                               'reactive work'), self%condition, condition_words)
       call keys%bind_word(key('quantity', 'of the first observed quantity, what is largest'), &
                           self%quantity, resonance_words)
-      call keys%bind_word(key('continuation', "given values, or a branch through folds (condition = 'phase')"), &
+      call keys%bind_word(key('continuation', &
+                              "given values, or a branch through folds (condition = 'phase')"), &
                           self%continuation, continuation_words)
       call keys%bind(key('max_points', 'of a branch', at_least(2), &
                          only="continuation = 'arclength'"), self%max_points)

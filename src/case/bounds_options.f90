@@ -29,9 +29,10 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('bounds', 'lowest and highest response over all residual tractions')
-      call keys%bind_word(key('quantity', 'of the first observed quantity, or of all pairs'), self%quantity, &
-                              quantity_words)
-      call keys%bind(key('n_starts', 'tractions to start from: centre, ends of the gradient, drawn corners', &
+      call keys%bind_word(key('quantity', 'of the first observed quantity, or of all pairs'), &
+                          self%quantity, quantity_words)
+      call keys%bind(key('n_starts', &
+                         'tractions to start from: centre, ends of the gradient, drawn corners', &
                          from_to(fewest_starts, most_starts)), self%n_starts)
    end subroutine bind_keys
 

@@ -42,8 +42,8 @@ contains
       call keys%bind(key('n_patterns', 'disks, the first patterns; 0: all', &
                          from_to(0, most_patterns)), self%n_patterns)
       call keys%bind(key('peaks', 'look for maxima between the rows'), self%peaks)
-      call keys%bind_word(key('quantity', 'of the first harmonic, or the largest deflection'), self%quantity, &
-                              resonance_words)
+      call keys%bind_word(key('quantity', 'of the first harmonic, or the largest deflection'), &
+                          self%quantity, resonance_words)
       call keys%bind(key('patterns', 'pattern after pattern, each as mistuning%frequency', &
                          shape=':', repeats=.false., absent='/mistuning/patterns of the file', &
                          only=of_population), self%patterns)

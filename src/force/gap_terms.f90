@@ -49,12 +49,13 @@ contains
       call keys%bind(key('gap_harmonic', 'harmonic, 0 to n_harmonics', &
                          from_to(0, most_harmonic), shape='n_gap_terms', &
                          absent='1, or by gap_order'), self%harmonic)
-      call keys%bind(key('gap_order', 'in place of harmonics: the frequency is their greatest common divisor '// &
-                                      'times the speed', &
-                         from_to(0, most_harmonic), shape='n_gap_terms', &
-                         absent='gap_harmonic'), self%order)
-      call keys%bind(key('gap_amplitude', 'widest at n tau = -gap_phase', unit='L', shape='n_gap_terms', &
-                         absent='required with n_gap_terms'), self%amplitude, needed)
+      call keys%bind(key('gap_order', &
+                         'in place of harmonics: the frequency is their greatest common '// &
+                         'divisor times the speed', from_to(0, most_harmonic), &
+                         shape='n_gap_terms', absent='gap_harmonic'), self%order)
+      call keys%bind(key('gap_amplitude', 'widest at n tau = -gap_phase', unit='L', &
+                         shape='n_gap_terms', absent='required with n_gap_terms'), self%amplitude, &
+                     needed)
       call keys%bind(key('gap_phase', 'of cos(n tau + phase)', unit='degrees', &
                          shape='n_gap_terms'), self%phase, default=0.0_wp)
    end subroutine bind_keys

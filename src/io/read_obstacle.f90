@@ -66,8 +66,9 @@ contains
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(inout) :: contact
 
-      call reader%bind_word(key('sliding', 'friction along the path of speed and vibration, or against the '// &
-                                           'speed alone'), contact%sliding, sliding_words)
+      call reader%bind_word(key('sliding', &
+                                'friction along the path of speed and vibration, or against '// &
+                                'the speed alone'), contact%sliding, sliding_words)
    end subroutine keys_of_sliding
 
    !> What a model holds of the gaps in harmonics.
