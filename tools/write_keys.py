@@ -229,6 +229,8 @@ def default(key: dict[str, Any]) -> str:
     """In words and, where the component has one, the value; a model file stands above both."""
     absent = re.sub("^of the file(, else )?", "", key.get("absent", ""))
     absent = re.sub(r"required with (?:n_\w+|coefficient)", "required", absent)
+    if absent == "required":
+        return absent
     parts = [coded(absent)] if absent not in ("", "none") else []
     if "default" in key and key["type"] != "word":
         parts.append(f"`{key['default']}`")
@@ -276,7 +278,7 @@ def table(group: str, keys: dict[str, Any], parameters: list[str]) -> str:
     for (name, key), only in zip(keys.items(), conditions):
         words = accepts(key)
         if group != "sweep" and key.get("words", [])[-len(parameters):] == parameters:
-            words = f"`{key['default']}`, and others of `sweep%parameter`"
+            words = "those of `sweep%parameter`"
         values = "; ".join(filter(None, (default(key), words)))
         text = meaning(key)
         apart = conditions.count(only) >= TOGETHER
