@@ -80,8 +80,8 @@ module fw_remark_table
                   'histories, other methods and memory = ''carried''); steps of a session '// &
                   'keep one harmonic'), &
       remark_kind('unstable', &
-                  'coriolis, circulatory, unsymmetric or air forces: without contact the '// &
-                  'linear structure has a mode that grows'), &
+                  'without contact the linear structure has a mode that grows: coriolis, '// &
+                  'circulatory, unsymmetric or air forces'), &
       remark_kind('beyond reduction', &
                   'the highest harmonic of the highest frequency is above '// &
                   '/reduction/frequency of the model file'), &
