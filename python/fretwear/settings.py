@@ -191,8 +191,11 @@ class Structure(TypedDict, total=False):
     rayleigh_mass: float
     #: [s] adds this times K, with rotation, to the damping (default: 0)
     rayleigh_stiffness: float
-    #: fraction of critical damping of all modes with open contact (default: 0)
+    #: fraction of critical damping of all modes (default: 0)
     modal_damping: float
+    #: modes with open contact, or with all pairs stuck: `closed` of analysis 'modes'; only:
+    #: modal_damping (default: 'open')
+    modal_damping_of: Literal["open", "stuck"]
     #: [Hz] of modes up to this frequency alone, which is faster; 0: of all; only: modal_damping
     #: (default: 0)
     modal_damping_up_to: float

@@ -219,8 +219,8 @@ contains
    end subroutine go_back
 
    !> From the response at other shares, by halves of the way where one step does not lead there.
-   !> Careful, no step may change more than a small part of the vibration, however short: a fold or a
-   !> jump does, and ends the way.
+   !> Careful, no step may change more than a small part of the vibration, however short: a fold or
+   !> a jump does, and ends the way.
    subroutine solve_on_the_way(self, from, shares, way, done, error)
       class(balanced_shares), intent(inout) :: self
       type(share_point), intent(in) :: from

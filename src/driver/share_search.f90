@@ -3,8 +3,8 @@
 !>
 !> Every share that is solved is kept: ends are often corners, which several descents come to.
 !>
-!> The response over the shares may fold: behind a fold there is none near by, and a step that is too
-!> long jumps to another branch. Where one of the steps shows that, the search begins anew with ways
+!> The response over the shares may fold: behind a fold there is none near by, and a step that is
+!> too long jumps to another branch. Where one of the steps shows that, the search begins anew with ways
 !> in steps so short that none jumps. What it finds then are shares that a straight way from the
 !> centre leads to, so that anyone can go there.
 module fw_share_search
@@ -215,8 +215,8 @@ contains
       end do
    end subroutine draw_shares
 
-   !> The place of the lowest (side 1) or the highest value that the centre may lead to; on ways that
-   !> are not used, or anywhere.
+   !> The place of the lowest (side 1) or the highest value that the centre may lead to; on ways
+   !> that are not used, or anywhere.
    pure integer function best_of(self, side, is_used) result(at)
       class(share_search), intent(in) :: self
       integer, intent(in) :: side
@@ -346,8 +346,8 @@ contains
       if (from == 1) self%n_failed = self%n_failed + 1
    end subroutine go_to
 
-   !> Note a response: that at the shares wanted, or one on the way which is lower or higher than all
-   !> before.
+   !> Note a response: that at the shares wanted, or one on the way which is lower or higher than
+   !> all before.
    subroutine keep(self, point, from, is_wanted, at)
       class(share_search), intent(inout) :: self
       type(share_point), intent(inout) :: point
@@ -374,8 +374,8 @@ contains
       self%known(at) = point
    end subroutine keep
 
-   !> Whether the value of two responses differs by more than their slopes can say: a step to another
-   !> branch, or one that is too long to tell.
+   !> Whether the value of two responses differs by more than their slopes can say: a step to
+   !> another branch, or one that is too long to tell.
    pure logical function jumps(from, to)
       type(share_point), intent(in) :: from, to
       real(wp) :: mean, most
