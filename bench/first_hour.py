@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import os
+import re
 import resource
 import shlex
 import shutil
@@ -28,6 +29,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SECTOR, WEAR = "example/blade_sector/frf.nml", "example/wear/oscillator.nml"
 ANIMATE = """import fretwear as fw
 fw.Result("frf.h5").animate("blade.gif", frames=12)"""
+OWN_MESH = ROOT / "example" / "own_mesh"
 WHOLE = """import fretwear as fw
 model = fw.Model([[1.0]], [[0.02]], [[1.0]], cosine=[1.0], springs=[fw.Spring(1, coefficient=0.1)],
                  contact=fw.ContactPairs([[1, 0, 0]], mu=0.3, normal_load=1.0))
@@ -45,8 +47,9 @@ class Step:
     commands: tuple[str, ...]
     #: Seconds after which Ctrl-C is pressed.
     stop_after: float = 0.0
-    #: Packages that it takes.
+    #: Packages and programs that it takes.
     packages: tuple[str, ...] = ()
+    programs: tuple[str, ...] = ()
 
 
 def steps(python: str, build: Path, work: Path) -> list[Step]:
@@ -55,6 +58,10 @@ def steps(python: str, build: Path, work: Path) -> list[Step]:
     beam = (f"{python} -m pytest -q -p no:cacheprovider {ROOT}/python/tests/test_import_mesh.py "
             "-k test_reduced_model_keeps_mesh")
     legacy = work / "legacy"
+    page = (OWN_MESH / "README.md").read_text()
+    model, = re.findall(r"^    fretwear (import disk\.msh .*\n.*)$", page, re.MULTILINE)
+    model = " ".join(model.replace("\\", "").split())
+    lines, = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     return [
         Step("first response", f"fw_run -o frf.h5 {SECTOR}",
              (f"{run} -q -o frf.h5 {ROOT}/{SECTOR}",)),
@@ -74,6 +81,14 @@ def steps(python: str, build: Path, work: Path) -> list[Step]:
         Step("own mesh: import, run, motion of every node against finite elements",
              "fretwear import ... --mesh beam.inp, as in python/tests/test_import_mesh.py",
              (beam,), packages=("meshio", "skfem", "pytest")),
+        Step("own mesh of Gmsh: one of twelve sectors of a disk", "gmsh -3 disk.geo",
+             (f"cp {OWN_MESH}/* .", "gmsh -3 disk.geo"), programs=("gmsh",)),
+        Step("own mesh: matrices by CalculiX, cut faces, reduction",
+             "fretwear import disk.msh --ccx --sectors 12 ...", (f"{tool} {model}",),
+             programs=("gmsh", "ccx")),
+        Step("own mesh: response, and all sectors as a picture that turns",
+             "fw.frf(...).animate(...)", (f"{python} -c {shlex.quote(lines)}",),
+             packages=("pyvista",), programs=("gmsh", "ccx")),
         Step("best normal load of a damper, by derivatives",
              "fretwear optimise example/damper/damper.nml --minimise max_amplitude "
              "--over contact%normal_load --bounds 0.05 5",
@@ -134,7 +149,8 @@ def main() -> None:
         for step in steps(sys.executable, build, work):
             if options.steps and not any(word in step.name for word in options.steps):
                 continue
-            if not all(map(importlib.util.find_spec, step.packages)):
+            if not (all(map(importlib.util.find_spec, step.packages))
+                    and all(map(shutil.which, step.programs))):
                 continue
             elapsed, spent = timed(step, work, environment)
             print(f"| {step.name} | `{step.shown}` | {elapsed:.1f} | {spent:.1f} |", flush=True)

@@ -36,20 +36,31 @@ CONSTANTS = {"tangential_stiffness": 1.0, "normal_stiffness": 1.0, "slip_speed":
 
 
 def law_table(program: str, groups: Keys) -> str:
-    """The table as Markdown."""
+    """A row for each column of the laws, as Markdown: those that take part."""
     keys = groups["contact"]["keys"]
     laws = keys["law"]["words"]
-    lines = ["| `law` | " + " | ".join(COLUMNS) + " |", "|---" * (len(COLUMNS) + 1) + "|"]
+    taken: dict[str, list[str]] = {column: [] for column in COLUMNS}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "law.nml"
         for law in laws:
             own = {name: value for name, value in CONSTANTS.items()
                    if name in keys and f"'{law}'" in keys[name].get("only", "")}
             ask(program, path, case(law, own))
-            cells = ["yes" if ask(program, path, case(law, own, more), word) else "-"
-                     for more, word in COLUMNS.values()]
-            lines.append(f"| `'{law}'` | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+            for column, (more, word) in COLUMNS.items():
+                if ask(program, path, case(law, own, more), word):
+                    taken[column].append(law)
+    rows = [f"| {column} | {listed(found, laws)}" for column, found in taken.items()]
+    return "\n".join(["| what | laws", "|---|---", *rows])
+
+
+def listed(found: list[str], laws: list[str]) -> str:
+    """Laws by name, or those that are missing where they are fewer."""
+    missing = [law for law in laws if law not in found]
+    if not missing:
+        return "all"
+    fewer = len(missing) < len(found)
+    names = ", ".join(f"`'{law}'`" for law in (missing if fewer else found))
+    return f"all but {names}" if fewer else names
 
 
 def case(law: str, constants: dict[str, float], more: Groups | None = None) -> Groups:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -23,11 +23,16 @@ _HEADINGS = ("h1", "h2", "h3", "h4", "h5")
 
 @dataclass
 class Entry:
-    """A section of a page, or a row of a table that begins with a word of code."""
+    """A section of a page, or a row of a table that begins with a word of code.
+
+    A row that begins with several names of keys is an entry for each.
+    """
 
     anchor: str
     title: str = ""
     text: list[str] = field(default_factory=list)
+    #: Spans of code in the first cell of a row.
+    names: list[str] = field(default_factory=list)
 
     def shown(self) -> str:
         """Its text in one line."""
@@ -60,6 +65,8 @@ class _Page(HTMLParser):
             self._row, self._n_cells = Entry(self._sections[-1].anchor), 0
         elif tag in ("td", "th"):
             self._n_cells += 1
+        elif tag == "code" and self._row is not None and self._n_cells == 1:
+            self._row.names.append("")
 
     def handle_endtag(self, tag: str) -> None:
         if tag in _VOID or not any(tag == name for name, _ in self._open):
@@ -69,8 +76,9 @@ class _Page(HTMLParser):
         if tag == "section" and self._sections:
             self._sections.pop()
         elif tag == "tr" and self._row is not None:
-            if self._row.title:
-                self.entries.append(self._row)
+            are_keys = all(re.fullmatch(r"\w+", name) for name in self._row.names)
+            self.entries += [replace(self._row, title=name)
+                             for name in (self._row.names if are_keys else self._row.names[:1])]
             self._row = None
         elif tag in ("p", "td", "th", "li", "div", *_HEADINGS) and self._sections:
             self._add(" ")
@@ -82,9 +90,8 @@ class _Page(HTMLParser):
         if self._is_within(*_HEADINGS):
             self._sections[-1].title += data
             return
-        if self._row is not None and self._n_cells == 1 and self._is_within("code") \
-                and not self._row.title:
-            self._row.title = data
+        if self._row and self._row.names and self._n_cells == 1 and self._is_within("code"):
+            self._row.names[-1] += data
         self._add(data)
 
     def _add(self, data: str) -> None:
@@ -132,7 +139,8 @@ def index_page(docs: Path) -> str:
                                   (docs / "keys.md").read_text(encoding="utf-8"), re.DOTALL):
         heading = _heading_before(docs / "keys.md", f"<!-- keys of {group} -->")
         keys += [f"* [`{key}`](keys.md#{heading}) of `&{group}`"
-                 for key in re.findall(r"^\| `(\w+)` \|", rows, re.MULTILINE)]
+                 for cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", rows, re.MULTILINE)
+                 for key in re.findall(r"\w+", cell)]
     messages = []
     heading = ""
     for line in (docs / "messages.md").read_text(encoding="utf-8").splitlines():

@@ -59,103 +59,135 @@ def declared(program: str) -> Keys:
     return json.loads(shown.stdout)
 
 
-#: What to do instead of a feature wherever nothing else is said; said once, above the table.
-REMEDIES = {"harmonics%accuracy": "give n_harmonics", "output%tail": "take more n_harmonics",
-            "contact%memory = 'carried'": "use 'assembly'",
-            "sweep%continuation = 'arclength'": "use 'natural'",
-            "solver%kind = 'pseudo_time'": "use 'newton'",
-            "case%analysis = 'time' or 'ringdown'": "use 'frf' or 'point'",
-            "a case without a vibratory load": "set load%cosine or load%sine",
-            "a case without a load in harmonic 1": "set load%cosine or load%sine"}
-
-
 def rules(program: str) -> str:
-    """What does not go together as Markdown: a row for each asker, what it needs and forbids."""
+    """What does not go together as Markdown: a row for each asker, what it needs and forbids.
+
+    Remedies stand in the messages and in `fw_run --rules`.
+    """
     shown = subprocess.run([program, "--rules"], check=True, capture_output=True, text=True)
     needs: dict[str, list[str]] = {}
-    refuses: dict[str, dict[str, list[str]]] = {}
+    refuses: dict[str, list[str]] = {}
+    askers = []
     for line in shown.stdout.splitlines():
         asks, rest = line.split(" does not go with ", 1)
-        forbids, remedy = rest.split(": ", 1)
-        needs.setdefault(asks, [])
-        others = refuses.setdefault(asks, {})
-        known = remedy == REMEDIES.get(forbids)
-        remedy = action(remedy)
-        known = known or not remedy
+        askers.append(asks)
+        forbids = re.sub(r" \(contact%.*\)|, (?:which|whose) .*", "", rest.split(": ", 1)[0])
         if found := re.fullmatch(r"(\S+) other than (.*)", forbids):
-            # "use" of what is needed says nothing more.
-            plain = known or remedy in (f"use {found[2]}", f"set memory = {found[2]}")
-            said = quoted(f"{found[1]} = {found[2]}")
-            needs[asks].append(said if plain else f"{said}: {quoted(remedy)}")
+            needs.setdefault(asks, []).append(f"{found[1]} = {found[2]}")
         elif found := re.fullmatch(r"a (?:case|law|pair) without (.*)", forbids):
-            said = quoted(found[1])
-            needs[asks].append(said if known else f"{said}: {quoted(remedy)}")
+            needs.setdefault(asks, []).append(found[1])
         else:
-            others.setdefault("" if known else remedy, []).append(forbids)
-    common = [f"* {quoted(name)}: {quoted(remedy)}" for name, remedy in REMEDIES.items()]
-    lines = ["A remedy stands behind a colon. Without one, leave one of the two out; of these:",
-             "", *common, "", "| what | needs | does not go with |", "|---|---|---|"]
-    for asks, remedies in refuses.items():
-        cells = [", ".join(map(quoted, forbids)) + (f": {quoted(remedy)}" if remedy else "")
-                 for remedy, forbids in remedies.items()]
-        lines.append(f"| {quoted(asks)} | {'; '.join(needs[asks])} | {'; '.join(cells)} |")
-    return "\n".join(lines)
+            refuses.setdefault(asks, []).append(forbids)
+    rows = [f"| {quoted(asks)} | {cell(needs, asks)} | {cell(refuses, asks)}".rstrip()
+            for asks in dict.fromkeys(askers)]
+    return "\n".join(["| what | needs | does not go with", "|---|---|---", *rows])
 
 
-def action(remedy: str) -> str:
-    """What to do, without the reason that the program gives; empty where it is to leave out."""
-    last = re.split("[;:] ", remedy)[-1]
-    if re.fullmatch("leave (it|them|stability|the speeds) out", last):
-        return ""
-    told = re.match("(use|give|leave|take|set|sweep|run|follow) ", last) and "this" not in last
-    return last if told else remedy
+def cell(found: dict[str, list[str]], asks: str) -> str:
+    return quoted(", ".join(found.get(asks, [])))
 
 
-def parts(program: str) -> str:
+#: Parts that have the name of a key and are something else.
+OWN_PARTS = ("gap_harmonic",)
+
+
+def home(name: str) -> str:
+    """The group of a part as Markdown names it; an attribute has a home of its own."""
+    path = name.split("`")[1]
+    return f"{path}@" if " attribute " in name else path.rpartition("/")[0]
+
+
+def parts(program: str, groups: Keys) -> str:
     """What a model file may hold, as Markdown; one row for parts that differ in their name alone.
 
-    Kinds are said where they are not real, `[pair]` is one value each or one for all.
+    Kinds are said where they are not real, `[pair]` is one value each or one for all. Parts that a
+    key of the same group and name explains stand together.
     """
     shown = subprocess.run([program, "--parts"], check=True, capture_output=True, text=True)
     code = re.compile(r"\w+%\w+|&\w+|(?<!\w)/\w+(?:/\w+)*|'[^']+'|coefficient \* \w+\*\*power")
     rows: list[tuple[str, str, str]] = []
     for line in shown.stdout.splitlines()[2:]:
         name, kind, shape, required, text = line.removeprefix("| ").removesuffix(" |").split(" | ")
-        shape = re.sub(r"\((\w+)\) or scalar", r"[\1]", shape.strip())
+        shape = re.sub(r"\((\w+)\) or scalar", r"[\1]", shape.strip()).replace(", ", ",")
         shape = shape if kind == "real" else f"{kind} {shape}".strip()
         text = code.sub(lambda found: f"`{found[0]}`", text)
+        path = name.split("`")[1]
+        group, _, last_name = path.removeprefix("/").rpartition("/")
+        keys = groups.get(group or "model", {}).get("keys", {})
+        attribute = name.split("`")[3] if " attribute " in name else ""
+        keys = groups.get(path.strip("/") or "model", {}).get("keys", {}) if attribute else keys
+        of_key = (attribute or last_name) in keys and last_name not in OWN_PARTS
+        if of_key:
+            text = "key"
         if required := required.strip():
-            path = name.split("`")[1]
-            group = path if " attribute " in name else path.rsplit("/", 1)[0]
-            own = required in ("required", "with its group", f"with {group}")
+            above = path if " attribute " in name else path.rsplit("/", 1)[0]
+            own = required in ("required", "with its group", f"with {above}")
             text = f"{'required' if own else required}: {text}"
+        text = re.sub(r"; law = `.*", "", text)
         last = rows[-1] if rows else ("", "", "")
-        if shape == last[1] and text in ("likewise", "the same along t2"):
-            text = last[2] if text == "likewise" else last[2].replace("along t1", "along t1, t2")
-            rows[-1] = (f"{last[0]}, `{name.strip('`').rsplit('/', 1)[1]}`", shape, text)
+        same = next((k for k, row in enumerate(rows) if of_key and row[1:] == (shape, text)
+                     and home(row[0]) == home(name)), None)
+        if same is not None:
+            rows[same] = (f"{rows[same][0]}, `{attribute or last_name}`", shape, text)
+        elif shape == last[1] and "attribute" not in name and text in ("likewise", last[2]):
+            rows[-1] = (f"{last[0]}, `{last_name}`", shape, last[2])
         else:
             rows.append((name, shape, text))
-    return "\n".join(["| name | shape | meaning |", "|---|---|---|",
-                      *(f"| {name} | {shape} | {text} |" for name, shape, text in rows)])
+    return "\n".join(["| name | shape | meaning", "|---|---|---",
+                      *(f"| {name} | {shape} | {text}" for name, shape, text in rows)])
+
+
+#: Words by which a message is known.
+MESSAGE = 9
 
 
 def said(program: str, option: str) -> str:
-    """What a run may remark, and its messages, as Markdown."""
+    """What a run may remark, in its first clause, and its messages, as Markdown."""
     shown = subprocess.run([program, option], check=True, capture_output=True, text=True)
     code = re.compile(r"(?:fw_run |fretwear run |(?<!\w))--\w+|&contact worn|&\w+ \w+ = '[^']+'|"
                       r"\w+%\w+(?: = '[^']+')?|&\w+|(?<![\w)])/\w+(?:/\w+)*|"
                       r"\w+ = (?:'[^']+'|[\d.]+(?:e[+-]?\d+)?)|'[^']+'|\b[a-z]+_[a-z][a-z_0-9]*\b")
-    lines = shown.stdout.splitlines()
-    for k, line in enumerate(lines[2:], 2):
+    heads, *lines = shown.stdout.splitlines()
+    rows = [heads.removesuffix(" |"), "|---|---"]
+    for line in lines[1:]:
         name, text = line.removeprefix("| ").removesuffix(" |").split(" | ", 1)
-        lines[k] = f"| `{name}` | {code.sub(lambda found: f'`{found[0]}`', text)} |"
-    return "\n".join(lines)
+        text = first_clause(text) if option == "--remarks" else text.split(". Exit status")[0]
+        text = code.sub(lambda found: f"`{compact(found[0])}`", text)
+        words = name.split(" ")
+        if len(words) > MESSAGE + 1:
+            name = " ".join([*words[:MESSAGE], "..."])
+        rows.append(f"| `{name}` | {text}")
+    return "\n".join(rows)
+
+
+#: Where a remark is made, before it says what of.
+WHERE = re.compile(r"(?:wear|campbell|bounds|population|&\w+|\w+ = '\w+'|fw_run --explain): ")
+
+#: What follows a remark as its reason.
+REASON = re.compile(r", (?:as|so that|even|however|which) ")
+#: Words that hardly say what of.
+FEW = 6
+
+
+def first_clause(text: str) -> str:
+    """Without parentheses and what follows a semicolon, a colon or the first sentence."""
+    text = re.sub(r" \((?![xyz])[^()]*(?:\([^()]*\)[^()]*)*\)", "", text)
+    start = found.end() if (found := WHERE.match(text)) else 0
+    first, *rest = re.split(r"[;:] |\. (?=[A-Z])", text[start:])
+    if rest and len(first.split()) < FEW:
+        first = f"{first}: {rest[0]}"
+    return text[:start] + REASON.split(first)[0].removesuffix(".")
+
+
+def compact(setting: str) -> str:
+    """A key and its value without blanks, and without .true. alone."""
+    return setting.replace(" = .true.", "").replace(" = ", "=")
 
 
 def quoted(feature: str) -> str:
     """A feature with its key as code, and what it says of it as text."""
     return re.sub(r"\b\w+%\w+(?: = (?:'[^']*'|\.true\.|\d+))?|&\w+|/\w+/\w+|'[^']+'|"
-                  r"\b\w+_\w+\b", r"`\g<0>`", feature)
+                  r"\b\w+_\w+\b", lambda found: f"`{compact(found[0])}`", feature)
 
 
 def number(value: float) -> str:
@@ -163,76 +195,115 @@ def number(value: float) -> str:
 
 
 def range_text(key: dict[str, Any]) -> str:
-    """Such as `> 0, < 1`; '' where every number will do."""
+    """Such as `>0, <1`; '' where every number will do, and for counts."""
     if "within" in key:
-        return f"within +-{key['within']}"
-    if "least" in key and "most" in key:
-        return f"{number(key['least'])} to {number(key['most'])}"
+        return "dofs" if "n_rows" in str(key["within"]) else f"+-{key['within']}"
+    least, most = key.get("least", -1e300), key.get("most", 1e300)
+    counts = key["type"] == "integer" and least in (0, 1)
+    if most >= 1000 and counts:
+        return ""
+    if least > -1e300 and most < 1000:
+        return f"{number(least)} to {number(most)}"
     bounds = [("above", ">"), ("least", ">="), ("below", "<"), ("most", "<=")]
-    return ", ".join(f"{sign} {number(key[name])}" for name, sign in bounds
-                     if name in key and abs(key[name]) < 1e300)
+    return ", ".join(f"{sign}{number(key[name])}" for name, sign in bounds
+                     if name in key and abs(key[name]) < 1000)
 
 
 def accepts(key: dict[str, Any]) -> str:
+    """What the default does not say: words, bounds and the shape."""
     kind = key["type"]
+    shape = key.get("shape", ":").replace(" x ", "*")
+    shape = "" if shape == ":" else f"[{shape}]" if key["repeats"] else f"({shape})"
     if kind == "word":
-        words = ", ".join(f"`'{word}'`" for word in key["words"])
-        return f"{words}; [{key['shape']}]" if "shape" in key else words
-    if kind in ("text", "list"):
-        return "text" if kind == "text" else coded(key["accepts"])
-    if kind == "logical":
-        return "logical"
-    if key.get("whole"):
-        kind = "whole number"
-    text = f"{kind}s" if "shape" in key else kind
-    if bounds := range_text(key):
-        text = bounds if "shape" not in key else f"{text} {bounds}"
-    if "shape" in key and key["shape"] != ":":
-        text += f" [{key['shape']}]" if key["repeats"] else f" ({key['shape']})"
-    return text
+        words = [f"**`'{word}'`**" if f"'{word}'" == key.get("default") else f"`'{word}'`"
+                 for word in key["words"]]
+        return " ".join(filter(None, (", ".join(words), shape)))
+    if kind in ("text", "logical"):
+        return ""
+    if kind == "list":
+        return ""
+    return " ".join(filter(None, (range_text(key), shape)))
 
 
 def default(key: dict[str, Any]) -> str:
-    """In words and, where the component has one, the value."""
-    parts = [coded(key["absent"])] if "absent" in key else []
-    if "default" in key:
+    """In words and, where the component has one, the value; a model file stands above both."""
+    absent = re.sub("^of the file(, else )?", "", key.get("absent", ""))
+    absent = re.sub(r"required with (?:n_\w+|coefficient)", "required", absent)
+    if absent == "required":
+        return absent
+    parts = [coded(absent)] if absent not in ("", "none") else []
+    if "default" in key and key["type"] != "word":
         parts.append(f"`{key['default']}`")
-    return re.sub("^of the file", "file", ", else ".join(parts))
+    elif "default" in key and absent:
+        parts.append("the bold word")
+    return ", else ".join(parts)
 
 
 def coded(text: str) -> str:
     """Words in quotes, and names with an underscore or of a dataset, as code."""
-    return re.sub(r"\w+ = '[^' ]+'|'[^' ]+'|/\w+/\w+|\w+/\w+_\w+|\b\w+_\w+\b", r"`\g<0>`", text)
+    return re.sub(r"\w+ = '[^' ]+'|'[^' ]+'|/\w+/\w+|\w+/\w+_\w+|\b\w+_\w+\b",
+                  lambda found: f"`{compact(found[0])}`", text)
 
 
-def meaning(key: dict[str, Any], group: str) -> str:
-    """Unit, help and where the key acts, where that is not the whole group."""
+#: Laws of pairs that may slide.
+MOST_LAWS = "law = 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised'"
+
+
+def condition(key: dict[str, Any], group: str) -> str:
+    """Where a key acts, if that is not the whole group."""
+    own = GROUP_ONLY.get(group, f"analysis = '{group}'")
+    only = key.get("only", "").removeprefix(own).removeprefix(", ")
+    return coded(only.replace(MOST_LAWS, "law not 'iwan', 'bouc_wen'"))
+
+
+def meaning(key: dict[str, Any]) -> str:
+    """Unit and help."""
     text = coded(key["help"])
     if "unit" in key:
         text = ("`unit`: " if key["unit"] == "unit" else f"[{key['unit']}] ") + text
-    own = GROUP_ONLY.get(group, f"analysis = '{group}'")
-    only = key.get("only", "").removeprefix(own).removeprefix(", ")
-    return f"{text}; only: {coded(only)}" if only else text
+    return text
 
 
-def table(group: str, keys: dict[str, Any], parameters: str) -> str:
-    """The keys of a group as Markdown; the long list of parameters stands in one of them."""
-    lines = ["| key | default | accepts | meaning |", "|---|---|---|---|"]
-    for name, key in keys.items():
+#: So many keys that act under one condition have a table of their own.
+TOGETHER = 3
+
+
+def table(group: str, keys: dict[str, Any], parameters: list[str]) -> str:
+    """The keys of a group as Markdown: those without condition, then those of each condition.
+
+    The long list of parameters stands in `sweep%parameter` alone.
+    """
+    found: dict[str, list[str]] = {"": []}
+    conditions = [condition(key, group) for key in keys.values()]
+    for (name, key), only in zip(keys.items(), conditions):
         words = accepts(key)
-        if group != "sweep":
-            words = words.replace(parameters, "those of `sweep%parameter` but `'frequency'`")
-        lines.append(f"| `{name}` | {default(key)} | {words} | {meaning(key, group)} |")
+        if group != "sweep" and key.get("words", [])[-len(parameters):] == parameters:
+            words = "those of `sweep%parameter`"
+        values = "; ".join(filter(None, (default(key), words)))
+        text = meaning(key)
+        apart = conditions.count(only) >= TOGETHER
+        rows = found.setdefault(only if apart else "", [])
+        same = re.match(r"(?:\[[^]]*\] )?(?:the same|likewise)(?: along t2)?$", text)
+        if only and not apart:
+            text += f"; only: {only}"
+        if rows and same and rows[-1].split(" | ")[1] == values:
+            rows[-1] = rows[-1].replace(" | ", f", `{name}` | ", 1)
+        else:
+            rows.append(f"| `{name}` | {values} | {text}")
+    lines = []
+    for only, rows in found.items():
+        head = f"with {only}" if only else "key"
+        lines += [*([""] if lines else []), f"| {head} | values | meaning", "|---|---|---", *rows]
     return "\n".join(lines)
 
 
 def tables(groups: Keys, program: str) -> dict[str, tuple[str, str]]:
     """What stands between two marks: {first mark: (last mark, lines)}."""
     words = groups["sweep"]["keys"]["parameter"]["words"]
-    parameters = ", ".join(f"`'{word}'`" for word in words if word != "frequency")
+    parameters = [word for word in words if word != "frequency"]
     found = {f"keys of {group}": ("end of keys", table(group, content["keys"], parameters))
              for group, content in groups.items()}
-    return found | {"parts of a model file": ("end of parts", parts(program)),
+    return found | {"parts of a model file": ("end of parts", parts(program, groups)),
                     "remarks": ("end of remarks", said(program, "--remarks")),
                     "messages": ("end of messages", said(program, "--messages")),
                     "laws": ("end of laws", law_table(program, groups)),

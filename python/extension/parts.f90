@@ -3,11 +3,13 @@
 module fw_python_parts
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_case, only: case_type
+   use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type, fatal_error, status_usage
    use fw_kinds, only: wp
    use fw_namelist, only: parse_namelist
    use fw_namelist_data, only: namelist_type
    use fw_point_quantities, only: point_quantities, quantity_type
+   use fw_sector, only: damp_modes, sector_at
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
@@ -73,7 +75,10 @@ contains
             values = [case%sweep%speed_order]
          case ('modal_damping')
             ! Of sectors: that of other structures is in the damping.
-            values = [model%cyclic%modal_damping]
+            if (model%cyclic%modal_damping > 0.0_wp) then
+               call find_modal_damping(case, values, error)
+               if (allocated(error)) return
+            end if
          case ('aero/modes')
             if (allocated(model%cyclic%air)) values = flat(transpose(model%cyclic%air%modes))
          case ('aero/stiffness')
@@ -115,6 +120,33 @@ contains
       end associate
       if (.not. allocated(values)) allocate (values(0))
    end subroutine case_part
+
+   !> Damping of modes in harmonics 1 .. H, of the free dofs of the sector (H, n, n, 2), real and
+   !> imaginary part.
+   subroutine find_modal_damping(case, values, error)
+      type(case_type), intent(in) :: case
+      real(wp), allocatable, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices) :: nodal
+      real(wp), allocatable :: part(:, :, :)
+      integer :: h, k
+
+      allocate (values(0))
+      do h = 1, case%harmonics%n_harmonics
+         k = case%model%cyclic%nodal_diameter(h)
+         call sector_at(case%model, abs(k), nodal, error)
+         if (allocated(error)) return
+         if (allocated(nodal%damping)) deallocate (nodal%damping)
+         call damp_modes(case%model, abs(k), case%model%cyclic%modal_damping, nodal, error)
+         if (allocated(error)) return
+         if (k < 0) nodal%damping = conjg(nodal%damping)
+         allocate (part(2, size(nodal%damping, 1), size(nodal%damping, 1)))
+         part(1, :, :) = transpose(real(nodal%damping, wp))
+         part(2, :, :) = transpose(aimag(nodal%damping))
+         values = [values, [part]]
+         deallocate (part)
+      end do
+   end subroutine find_modal_damping
 
    !> Stiffness of the air in harmonics 1 .. H (H, a, a, 2), real and imaginary part; NaN where it
    !> is not known.

@@ -233,7 +233,8 @@ def test_relative_displacements_reach_the_next_sector(disk: Result) -> None:
     assert (open_share == 0.0).any()
 
 
-def test_forces_of_coriolis_and_of_the_air_are_recovered(tmp_path: Path) -> None:
+@pytest.mark.parametrize("of", ["open", "stuck"])
+def test_forces_of_coriolis_and_of_the_air_are_recovered(tmp_path: Path, of: str) -> None:
     """The motion of the whole disk follows from the forces with all of the structure in them: what
     is observed comes out again, and no longer without one of these parts."""
     model = tmp_path / "disk.h5"
@@ -249,7 +250,7 @@ def test_forces_of_coriolis_and_of_the_air_are_recovered(tmp_path: Path) -> None
             file[f"aero/sector/{m}"] = rng.normal(size=(2, 2, 2))
     result = run(DISK, tmp_path / "wave.h5", "case%analysis=point", "sweep%start=1285",
                  "solver%tolerance=1e-11", f"model%file='{model}'", "model%rotation_speed=500",
-                 "model%modal_damping=1e-3")
+                 "model%modal_damping=1e-3", f"model%modal_damping_of={of}")
     structure = read_structure(result)
     moved = recover_displacement(result, structure)
     assert moved @ structure.observe.T == pytest.approx(result.coefficients, rel=1e-6, abs=1e-9)
@@ -257,7 +258,8 @@ def test_forces_of_coriolis_and_of_the_air_are_recovered(tmp_path: Path) -> None
     assert np.isfinite(written.point_data["displacement"]).all()
     whirl = structure.whirl
     assert whirl is not None
-    for change in ({"coriolis": None}, {"air": np.zeros_like(whirl.air)}, {"modal_damping": 0.0}):
+    for change in ({"coriolis": None}, {"air": np.zeros_like(whirl.air)},
+                   {"modal_damping": whirl.modal_damping[:0]}):
         with pytest.raises(InputError, match="does not follow"):
             recover_displacement(result, replace(structure, whirl=replace(whirl, **change)))
 

@@ -15,6 +15,7 @@ from project import ROOT
 from test_import_calculix import WRITTEN, frequencies, run_import
 
 from fretwear.cli import main
+from fretwear.importer.deck import read_deck
 from fretwear.importer.meshes import read_mesh_file
 from fretwear.importer.sectors import cut_faces
 
@@ -22,27 +23,28 @@ EXAMPLE = ROOT / "example" / "own_mesh"
 PAGE = EXAMPLE / "README.md"
 #: The mesh and its motion are kept in single precision.
 STORED = 1e-4
-MODEL = ["--sectors", 12, "--pairs", "pairs.csv", "--observe", "tip=TIP:3"]
+MODEL = ["--material", "210000,0.3,7.85e-9", "--fix", "BORE", "--load", "TIP:3=3", "--sectors", 12,
+         "--pairs", "pairs.csv", "--observe", "tip=TIP:3"]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The example with its mesh and its matrices, by the commands of its page."""
-    for program in ("gmsh", "ccx", "awk"):
+    """The example with its mesh, by the command of its page."""
+    for program in ("gmsh", "ccx"):
         if shutil.which(program) is None:
             pytest.skip(f"{program} is not installed (apt install gmsh calculix-ccx)")
     path = tmp_path_factory.mktemp("own_mesh")
     for file in EXAMPLE.iterdir():
         shutil.copy(file, path)
     page = PAGE.read_text()
-    for command in re.findall(r"^    ((?:gmsh|awk|ccx) .*)$", page, re.MULTILINE):
+    for command in re.findall(r"^    (gmsh .*)$", page, re.MULTILINE):
         subprocess.run(command, shell=True, cwd=path, check=True, capture_output=True)
     return path
 
 
 def test_from_gmsh_to_paraview(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    assert run_import("disk.inp", "-q", *MODEL, "--reduce", 12, "-o", "disk.h5") == 0
+    assert run_import("disk.msh", "-q", "--ccx", *MODEL, "--reduce", 12, "-o", "disk.h5") == 0
     # The lines of the page, but for the picture.
     lines = re.findall(r"```python\n(.*?)result.animate", PAGE.read_text(), re.DOTALL)
     exec(lines[0], {})
@@ -70,15 +72,19 @@ def test_from_gmsh_to_paraview(folder: Path, monkeypatch: pytest.MonkeyPatch) ->
 def test_frequencies_are_those_of_the_cyclic_symmetry_of_calculix(
         folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    assert run_import("disk.inp", "-q", "--sectors", 12, "-o", "free.h5") == 0
+    # The deck that the import of the mesh wrote, imported as one's own.
+    assert run_import("disk.msh", "-q", "--ccx", *MODEL, "--check") == 0
+    assert run_import("disk_ccx.inp", "-q", "--ccx", "--fix", "BORE", "--sectors", 12, "-o",
+                      "free.h5") == 0
     found = frequencies(folder, folder / "free.h5")
-    mesh = read_mesh_file("disk.inp")
+    mesh = read_mesh_file("disk_ccx.inp")
     held = set(mesh.sets["BORE"])
     left, right, _ = cut_faces(12, None, None, "z", mesh)
     sets = "".join(f"*SURFACE, NAME={name}, TYPE=NODE\n" + "".join(
         f"{node}\n" for node in face.nodes if node not in held)
         for name, face in (("LEFT", left), ("RIGHT", right)))
-    deck = (folder / "disk.inp").read_text().partition("*STEP")[0]
+    deck = (folder / "disk_ccx.inp").read_text().partition("*STEP")[0] + (
+        "*BOUNDARY\nBORE, 1, 3\n")
     (folder / "cyclic.inp").write_text(
         deck + sets + "*TIE, NAME=CUT, CYCLIC SYMMETRY\nLEFT, RIGHT\n"
         "*CYCLIC SYMMETRY MODEL, N=12, TIE=CUT\n0, 0, 0, 0, 0, 1\n" + "".join(
@@ -92,9 +98,56 @@ def test_frequencies_are_those_of_the_cyclic_symmetry_of_calculix(
         assert found[k, 0] == pytest.approx(own, rel=WRITTEN)
 
 
+#: A box of tetrahedra, or by layers of wedges or hexahedra.
+BOX = """SetFactory("Built-in");
+Point(1) = {{0, 0, 0, 0.6}}; Point(2) = {{1.1, 0.1, 0, 0.6}}; Point(3) = {{1, 1, 0, 0.6}};
+Point(4) = {{0, 0.9, 0, 0.6}};
+Line(1) = {{1, 2}}; Line(2) = {{2, 3}}; Line(3) = {{3, 4}}; Line(4) = {{4, 1}};
+Curve Loop(1) = {{1, 2, 3, 4}}; Plane Surface(1) = {{1}};
+{recombine}
+Extrude {{0, 0, 1.3}} {{ Surface{{1}}; {layers} }}
+Physical Volume("BOX") = Volume{{:}}; Physical Surface("SKIN") = Surface{{:}};
+Mesh.ElementOrder = {order}; Mesh.SecondOrderIncomplete = 1;
+"""
+CELLS = {"tetrahedra": ("", ""), "wedges": ("", "Layers{3}; Recombine;"),
+         "hexahedra": ("Recombine Surface {1};", "Layers{3}; Recombine;")}
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("cells", CELLS)
+def test_nodes_of_cells_are_in_the_order_of_calculix(cells: str, order: int, tmp_path: Path,
+                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    """Constant strain leaves every inner node without force."""
+    for program in ("gmsh", "ccx"):
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed (apt install gmsh calculix-ccx)")
+    monkeypatch.chdir(tmp_path)
+    recombine, layers = CELLS[cells]
+    Path("box.geo").write_text(BOX.format(recombine=recombine, layers=layers, order=order))
+    subprocess.run(["gmsh", "-3", "box.geo"], check=True, capture_output=True)
+    assert run_import("box.msh", "-q", "--ccx", "--material", "210000,0.3,7.85e-9", "-o",
+                      "box.h5") == 0
+    deck = read_deck(Path("box_ccx.inp"))
+    assert len(deck.blocks) == 1
+    words = [word.split(".") for word in Path("box_ccx.dof").read_text().split()]
+    place = {int(node): point for node, point in zip(deck.nodes, deck.points)}
+    slope = np.array([[1.0, 0.3, 0.2], [0.1, -0.7, 0.4], [-0.5, 0.6, 0.9]])
+    motion = np.array([slope[int(c) - 1] @ place[int(node)] for node, c in words])
+    with h5py.File("box.h5") as file:
+        force = file["stiffness"][()] @ motion
+        size = np.abs(file["stiffness"][()]) @ np.abs(motion)
+        mass = file["mass"][()]
+    inner = np.array([int(node) not in deck.node_sets["SKIN"] for node, _ in words])
+    assert inner.any()
+    assert (np.abs(force)[inner] <= WRITTEN * size[inner]).all()
+    along = np.array([float(c == "1") for _, c in words])
+    assert along @ mass @ along == pytest.approx(7.85e-9 * 1.3 * 0.95, rel=WRITTEN)
+
+
 def test_the_page_has_the_commands_that_are_tried_here() -> None:
     """What the page says of the import is what the tests above do."""
     page = PAGE.read_text()
-    words = " ".join(map(str, MODEL))
-    assert f"fretwear import disk.inp {words} --reduce 12 -o disk.h5" in page
+    words = " ".join(page.replace("\\\n", " ").split())
+    model = " ".join(map(str, MODEL))
+    assert f"fretwear import disk.msh --ccx {model} --reduce 12 -o disk.h5" in words
     assert "fretwear export frf.h5 disk.vtu --sectors all" in page

@@ -22,7 +22,10 @@ PAGE = """<html><body><div class="sphinxsidebar"><nav>menu</nav></div><div class
 <p>A wedge between two blades is a friction damper that rotation presses.</p>
 <section id="keys"><h2>Keys</h2>
 <table><thead><tr><th><p>key</p></th><th><p>meaning</p></th></tr></thead>
-<tr><td><p><code><span>normal_load</span></code></p></td><td><p>constant force</p></td></tr></table>
+<tr><td><p><code><span>normal_load</span></code></p></td><td><p>constant force</p></td></tr>
+<tr><td><p><code>speed_1</code>, <code>speed_2</code></p></td><td><p>of a belt</p></td></tr>
+<tr><td><p><code><span>no</span> <span>load</span></code></p></td><td><p>nothing acts</p></td></tr>
+</table>
 </section></section></div></body></html>"""
 
 
@@ -30,7 +33,8 @@ def test_sections_and_rows_of_keys_are_found() -> None:
     found = pages_of(PAGE, "docs/bodies.html")
     assert [(one["title"], one["url"]) for one in found] == [
         ("Bodies", "docs/bodies.html#bodies"), ("Keys", "docs/bodies.html#keys"),
-        ("normal_load", "docs/bodies.html#keys")]
+        ("normal_load", "docs/bodies.html#keys"), ("speed_1", "docs/bodies.html#keys"),
+        ("speed_2", "docs/bodies.html#keys"), ("no load", "docs/bodies.html#keys")]
     assert found[0]["text"] == ("A wedge between two blades is a friction damper that rotation "
                                 "presses.")
     assert found[2]["text"] == "normal_load constant force" and found[2]["page"] == "Bodies"
@@ -47,8 +51,11 @@ def test_the_words_of_users_stand_for_those_of_the_documents() -> None:
 
 def test_every_key_and_message_is_in_the_index() -> None:
     index = index_page(ROOT / "docs")
-    keys = set(re.findall(r"^\| `(\w+)` \|", (ROOT / "docs" / "keys.md").read_text(), re.MULTILINE))
-    assert keys and all(f"* [`{key}`](keys.md#" in index for key in keys)
+    cells = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", (ROOT / "docs" / "keys.md").read_text(),
+                       re.MULTILINE)
+    keys = {key for cell in cells for key in re.findall(r"\w+", cell)}
+    assert {"modal_damping", "speed_1", "speed_2"} <= keys
+    assert all(f"* [`{key}`](keys.md#" in index for key in keys)
     assert index.count("](messages.md#") > 100
 
 

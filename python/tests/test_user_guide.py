@@ -57,7 +57,8 @@ def test_the_tables_and_the_settings_of_the_package_are_what_the_program_declare
     table = re.compile(r"<!-- keys of (\w+) -->\n(.*?)<!-- end of keys -->", re.DOTALL)
     tables = dict(table.findall(GUIDE))
     shown = {f"{group}%{key}" for group, rows in tables.items()
-             for key in re.findall(r"^\| `(\w+)` \|", rows, re.MULTILINE)}
+             for cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", rows, re.MULTILINE)
+             for key in re.findall(r"\w+", cell)}
     assert shown == read_keys()
 
 

@@ -32,12 +32,12 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('control', 'responses of given amplitudes')
-      call keys%bind(key('amplitude', 'of the response: the factor of the vibratory load is '// &
-                         'found, at each frequency, for one after the other', above(0.0_wp), &
-                         unit='L', shape=':', repeats=.false., absent='none: the load is given', &
-                         only="analysis = 'frf', 'point'"), self%amplitude)
-      call keys%bind_word(key('of', 'what the amplitude is: of the first harmonic, or the '// &
-                              'largest of the period'), self%of, of_words)
+      call keys%bind(key('amplitude', 'for which the load factor is found, one after the other', &
+                         above(0.0_wp), unit='L', shape=':', repeats=.false., &
+                         absent='none: the load is given', only="analysis = 'frf', 'point'"), &
+                     self%amplitude)
+      call keys%bind_word(key('of', 'of the first harmonic, or the largest of the period'), &
+                          self%of, of_words)
    end subroutine bind_keys
 
    pure logical function is_wanted(self)

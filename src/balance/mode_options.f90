@@ -52,33 +52,32 @@ contains
       logical :: is_range
 
       call keys%open('mode', 'a nonlinear mode over its amplitude')
-      call keys%bind(key('number', 'of the elastic modes of the structure with its closed '// &
-                         'pairs stuck', at_least(1)), self%number)
-      call keys%bind(key('near', 'the mode whose frequency with stuck pairs is nearest, in '// &
-                         'place of number; 0: by number', at_least(0.0_wp), unit='unit'), &
-                     self%near)
+      call keys%bind(key('number', 'of the elastic modes with closed pairs stuck', at_least(1)), &
+                     self%number)
+      call keys%bind(key('near', 'mode nearest to this stuck frequency; 0: by number', &
+                         at_least(0.0_wp), unit='unit'), self%near)
       call keys%bind_word(key('unit', 'of near; results are in rad/s'), self%unit, unit_words)
-      call keys%bind(key('amplitudes', 'a rising list of amplitudes, in place of start, end '// &
-                         'and n_points', above(0.0_wp), unit='L', shape=':', repeats=.false., &
-                         absent='none', only="analysis = 'mode', natural steps"), self%amplitudes)
+      call keys%bind(key('amplitudes', 'rising, in place of start, end, n_points', above(0.0_wp), &
+                         unit='L', shape=':', repeats=.false., absent='none', &
+                         only="analysis = 'mode', natural steps"), self%amplitudes)
       is_range = is_mode .and. .not. allocated(self%amplitudes)
       call keys%bind(key('start', 'lowest amplitude', above(0.0_wp), unit='L', &
                          absent='required', only="analysis = 'mode'"), self%start, &
                      needed=is_range)
       call keys%bind(key('end', 'highest amplitude', above(0.0_wp), unit='L', &
                          absent='required', only="analysis = 'mode'"), self%end, needed=is_range)
-      call keys%bind_word(key('control', 'what the amplitude is: of the first harmonic of the '// &
-                              'first observed quantity, or modal, sqrt(U^H M U) of it'), &
-                          self%control, control_words)
-      call keys%bind(key('n_points', 'points, even in the logarithm; of a branch: sets its '// &
-                         'longest step', from_to(2, most_points)), self%n_points)
-      call keys%bind_word(key('continuation', 'points at given amplitudes, or a branch through '// &
-                              'folds'), self%continuation, continuation_words)
-      call keys%bind(key('max_points', 'points of a branch at most', at_least(2), &
+      call keys%bind_word(key('control', &
+                              'amplitude of the first harmonic of the first observed quantity, '// &
+                              'or modal, sqrt(U^H M U)'), self%control, control_words)
+      call keys%bind(key('n_points', 'even in the logarithm; of a branch: its longest step', &
+                         from_to(2, most_points)), self%n_points)
+      call keys%bind_word(key('continuation', 'given amplitudes, or a branch through folds'), &
+                          self%continuation, continuation_words)
+      call keys%bind(key('max_points', 'of a branch', at_least(2), &
                          only="continuation = 'arclength'"), self%max_points)
-      call keys%bind(key('synthesis', 'factors of the vibratory load for which the response '// &
-                         'near the resonance is put together', above(0.0_wp), shape=':', &
-                         repeats=.false., absent='none'), self%synthesis)
+      call keys%bind(key('synthesis', &
+                         'load factors for which the response near the resonance is put together', &
+                         above(0.0_wp), shape=':', repeats=.false., absent='none'), self%synthesis)
    end subroutine bind_keys
 
 end module fw_mode_options

@@ -61,11 +61,11 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('harmonics', 'method, number of harmonics, instants per period')
-      call keys%bind_word(key('method', 'how the equations are weighted: Galerkin, '// &
-                              'collocation, least squares, or unknowns at the instants'), &
-                          self%method, method_words)
-      call keys%bind(key('n_harmonics', 'H, the highest harmonic; with accuracy the most that '// &
-                         'may be used', from_to(1, 10000), &
+      call keys%bind_word(key('method', &
+                              'Galerkin, collocation, least squares, or unknowns at the '// &
+                              'instants'), self%method, method_words)
+      call keys%bind(key('n_harmonics', 'H, the highest; with accuracy the most that may be used', &
+                         from_to(1, 10000), &
                          absent="53 with accuracy, 7 with 'mode', 'resonance', &control"), &
                      self%n_harmonics)
       call keys%bind(key('n_time', 'instants of a period, at least 2H+1; 0: chosen', &
@@ -73,17 +73,17 @@ contains
       call keys%bind(key('n_collocation', 'instants of the equations; 0: twice the '// &
                          'coefficients', at_least(0), only="method = 'tcm_least_squares'"), &
                      self%n_collocation)
-      call keys%bind(key('filter_harmonics', 'harmonics above this one do not reach nonlinear '// &
-                         'springs; 0: no filter', at_least(0), only="method = 'hdhb'"), &
-                     self%filter_harmonics)
-      call keys%bind_word(key('sampling', 'decide stick, slip and separation at the instants, '// &
-                              'or locate them on the series'), self%sampling, sampling_words)
-      call keys%bind_word(key('parity', 'which harmonics are kept; auto leaves even ones out '// &
-                              'where that is exact'), self%parity, parity_words)
-      call keys%bind(key('accuracy', 'relative error of the response for which harmonics and '// &
-                         'instants are chosen; 0: as given', at_least(0.0_wp) .and. &
-                         below(1.0_wp), only="method = 'hbm', natural sweeps and points"), &
-                     self%accuracy)
+      call keys%bind(key('filter_harmonics', 'those above do not reach springs; 0: no filter', &
+                         at_least(0), only="method = 'hdhb'"), self%filter_harmonics)
+      call keys%bind_word(key('sampling', &
+                              'stick, slip and separation at instants, or located on the series'), &
+                          self%sampling, sampling_words)
+      call keys%bind_word(key('parity', '''auto'' leaves even harmonics out where that is exact'), &
+                          self%parity, parity_words)
+      call keys%bind(key('accuracy', &
+                         'relative error for which harmonics and instants are chosen; 0: as '// &
+                         'given', at_least(0.0_wp) .and. below(1.0_wp), &
+                         only="method = 'hbm', natural sweeps and points"), self%accuracy)
    end subroutine bind_keys
 
    !> The same options with another highest harmonic, and with instants that are enough for it:

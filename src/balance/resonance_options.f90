@@ -70,21 +70,21 @@ contains
                      self%start, needed=is_resonance)
       call keys%bind(key('end', 'last value, or factor', absent='required', only=only), &
                      self%end, needed=is_resonance)
-      call keys%bind(key('n_points', 'values; of a branch: sets its longest step', &
+      call keys%bind(key('n_points', 'values; of a branch: its longest step', &
                          from_to(2, most_points)), self%n_points)
-      call keys%bind_word(key('spacing', 'even steps, or even in the logarithm'), self%spacing, &
+      call keys%bind_word(key('spacing', 'even steps, or in the logarithm'), self%spacing, &
                           spacing_words)
-      call keys%bind_word(key('as', 'what start and end are: values, or factors of those of '// &
-                              'the case (all pairs or springs together)'), self%as, as_words)
+      call keys%bind_word(key('as', &
+                              'values, or factors of those of the case (all pairs or springs '// &
+                              'together)'), self%as, as_words)
       call keys%bind_word(key('condition', 'the response is largest, or the load does no '// &
                               'reactive work'), self%condition, condition_words)
-      call keys%bind_word(key('quantity', 'of the first observed quantity, what is largest: '// &
-                              'the amplitude of its first harmonic, or its largest value'), &
+      call keys%bind_word(key('quantity', 'of the first observed quantity, what is largest'), &
                           self%quantity, resonance_words)
-      call keys%bind_word(key('continuation', "points at given values, or a branch through "// &
-                              "folds (condition = 'phase')"), self%continuation, &
-                          continuation_words)
-      call keys%bind(key('max_points', 'points of a branch at most', at_least(2), &
+      call keys%bind_word(key('continuation', &
+                              "given values, or a branch through folds (condition = 'phase')"), &
+                          self%continuation, continuation_words)
+      call keys%bind(key('max_points', 'of a branch', at_least(2), &
                          only="continuation = 'arclength'"), self%max_points)
    end subroutine bind_keys
 

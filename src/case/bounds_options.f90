@@ -29,10 +29,10 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('bounds', 'lowest and highest response over all residual tractions')
-      call keys%bind_word(key('quantity', 'of which the range is looked for: of the first '// &
-                              'observed quantity, or of the pairs'), self%quantity, quantity_words)
-      call keys%bind(key('n_starts', 'residual tractions to start from: the centre, both ends '// &
-                         'of the gradient, and corners that are drawn', &
+      call keys%bind_word(key('quantity', 'of the first observed quantity, or of all pairs'), &
+                          self%quantity, quantity_words)
+      call keys%bind(key('n_starts', &
+                         'tractions to start from: centre, ends of the gradient, drawn corners', &
                          from_to(fewest_starts, most_starts)), self%n_starts)
    end subroutine bind_keys
 

@@ -45,12 +45,11 @@ contains
                          absent='required', only=of_campbell), self%start, needed=is_wanted)
       call keys%bind(key('end', 'highest rotation speed', above(0.0_wp), 'rad/s', &
                          absent='required', only=of_campbell), self%end, needed=is_wanted)
-      call keys%bind(key('n_speeds', 'speeds, from start to end', from_to(2, 10000)), &
-                     self%n_speeds)
-      call keys%bind(key('orders', 'engine orders, with the sign of cyclic%engine_order; none '// &
-                         'is 0', shape=':', repeats=.false., absent='required', &
-                         only=of_campbell), self%orders, needed=is_wanted)
-      call keys%bind(key('order_scale', 'factor of the vibratory load, of all orders or of each', &
+      call keys%bind(key('n_speeds', 'from start to end', from_to(2, 10000)), self%n_speeds)
+      call keys%bind(key('orders', 'engine orders, signed as cyclic%engine_order; not 0', &
+                         shape=':', repeats=.false., absent='required', only=of_campbell), &
+                     self%orders, needed=is_wanted)
+      call keys%bind(key('order_scale', 'factor of the vibratory load, of all orders or each', &
                          above(0.0_wp), shape=':', repeats=.false., absent='1'), self%order_scale)
       call keys%bind(key('peaks', 'look for the maximum near each crossing, with friction'), &
                      self%peaks)

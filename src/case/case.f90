@@ -162,14 +162,15 @@ contains
       call keys%open('case', 'title, kind of analysis, threads')
       call keys%bind(key('title', 'stands in the result file', &
                          absent='title of the model file, or name of the namelist'), self%title)
-      call keys%bind_word(key('analysis', 'a sweep, a frequency, wear, integration in '// &
-                              'time, frequencies, a nonlinear mode, a resonance, a '// &
-                              'Campbell diagram, mistuned disks, a range, free decay'), &
-                          self%analysis, analysis_words)
-      call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
-                         from_to(0, 1024)), self%threads)
-      call keys%bind(key('max_seconds', 'time after which the run ends with the points that '// &
-                         'are done; 0: none', at_least(0.0_wp), unit='s'), self%max_seconds)
+      call keys%bind_word(key('analysis', &
+                              'sweep, one frequency, wear, integration in time, linear modes, '// &
+                              'nonlinear mode, resonance, Campbell diagram, mistuned disks, '// &
+                              'range, free decay'), self%analysis, analysis_words)
+      call keys%bind(key('threads', 'OpenMP threads; 0: as OpenMP gives', from_to(0, 1024)), &
+                     self%threads)
+      call keys%bind(key('max_seconds', &
+                         'of the run, which ends with the points done; 0: no limit', &
+                         at_least(0.0_wp), unit='s'), self%max_seconds)
    end subroutine bind_case_keys
 
    !> The keys of group &output but for what is observed.
@@ -180,12 +181,12 @@ contains
       call keys%open('output', 'result file, observed quantities')
       call keys%bind(key('file', 'result file, relative to the namelist', &
                          absent='name of the namelist with .h5'), self%file)
-      call keys%bind(key('histories', 'write one period of every quantity at every point; '// &
-                         'large'), self%histories)
-      call keys%bind(key('contact', 'write contact forces, states and dissipation'), self%contact)
-      call keys%bind(key('tail', 'highest harmonic of the answer that is given back, above '// &
-                         'those of the balance; 0: theirs', from_to(0, 10000), &
-                         only="law = 'rigid'"), self%tail)
+      call keys%bind(key('histories', 'one period of every quantity at every point; large'), &
+                     self%histories)
+      call keys%bind(key('contact', 'forces, states and dissipation'), self%contact)
+      call keys%bind(key('tail', &
+                         'highest harmonic of the answer above those of the balance; 0: theirs', &
+                         from_to(0, 10000), only="law = 'rigid'"), self%tail)
    end subroutine bind_output_keys
 
 end module fw_case

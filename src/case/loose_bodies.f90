@@ -76,8 +76,8 @@ contains
 
       call keys%open('body', 'bodies of the model that no spring holds')
       call keys%set_size('n_bodies', self%count())
-      call keys%bind(key('mass', 'of each body of the model, in place of its own', above(0.0_wp), &
-                         unit='M', shape='n_bodies', absent='of the file'), self%mass)
+      call keys%bind(key('mass', 'of each body', above(0.0_wp), unit='M', shape='n_bodies', &
+                         absent='of the file'), self%mass)
    end subroutine bind_keys
 
    !> What a model says wrong of its bodies; empty where nothing is.

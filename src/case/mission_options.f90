@@ -44,25 +44,25 @@ contains
       character(*), parameter :: of_wear = "analysis = 'wear'"
 
       call keys%open('mission', 'wear over blocks of cycles in other conditions')
-      call keys%bind(key('n_blocks', 'blocks of a flight; 0: no mission', from_to(0, most_blocks), &
+      call keys%bind(key('n_blocks', 'of a flight; 0: no mission', from_to(0, most_blocks), &
                          only=of_wear), self%n_blocks)
       call keys%set_size('n_blocks', self%n_blocks)
-      call keys%bind(key('cycles', 'cycles of each block in a flight', above(0.0_wp) .and. &
-                         at_most(most_cycles), shape='n_blocks', &
-                         absent='required with n_blocks'), self%cycles, &
-                     needed=self%n_blocks > 0)
+      call keys%bind(key('cycles', 'of each block in a flight', &
+                         above(0.0_wp) .and. at_most(most_cycles), shape='n_blocks', &
+                         absent='required with n_blocks'), self%cycles, needed=self%n_blocks > 0)
       call keys%bind(key('n_flights', 'how often all blocks are flown', at_least(1)), &
                      self%n_flights)
-      call keys%bind_list(key('change', 'what each block changes in the case, as --set takes '// &
-                              'it; several parted by semicolons', absent='nothing', &
-                              shape='n_blocks'), 'texts', most_blocks, self%change, is_text)
+      call keys%bind_list(key('change', &
+                              'settings of each block as of --set, parted by semicolons', &
+                              absent='nothing', shape='n_blocks'), 'texts', most_blocks, &
+                          self%change, is_text)
       are_texts = all(is_text)
       call keys%bind_list(key('name', 'of each block', absent='block 1, block 2, ..', &
                               shape='n_blocks'), 'texts', most_blocks, self%name, is_text)
       are_texts = are_texts .and. all(is_text)
-      call keys%bind(key('flights_per_jump', 'flights that are taken together; 1: all in their '// &
-                         'order, 0: as many as wear%error_tolerance allows', at_least(0)), &
-                     self%flights_per_jump)
+      call keys%bind(key('flights_per_jump', &
+                         'taken together; 1: all in their order, 0: by wear%error_tolerance', &
+                         at_least(0)), self%flights_per_jump)
    end subroutine bind_keys
 
    pure logical function is_wanted(self)

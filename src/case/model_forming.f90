@@ -2,7 +2,6 @@
 !> and modal damping, factors, and the derivatives by these that are wanted.
 module fw_model_forming
    use fw_cyclic_data, only: speed_matrices
-   use fw_damping, only: add_modal_damping
    use fw_error, only: error_type
    use fw_kinds, only: pi, wp
    use fw_model, only: matrix_change, model_type
@@ -11,6 +10,7 @@ module fw_model_forming
    use fw_model_keys, only: model_options
    use fw_parameters, only: body_mass, is_of_matrices, loss_factor, modal_damping, rayleigh_mass, &
       rayleigh_stiffness, rotation_speed
+   use fw_sector, only: damp_structure
    implicit none (type, external)
    private
 
@@ -182,14 +182,17 @@ contains
       integer, intent(in) :: wanted(:)
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: damping(:, :)
 
-      ! Last: its modes are those of the rotating structure, contact open.
+      ! Last: its modes are those of the rotating structure.
       if (model%cyclic%is_cyclic) then
          ! Modes are those of the tied sectors.
          model%cyclic%modal_damping = options%modal_damping
       else if (options%modal_damping > 0.0_wp) then
-         call add_modal_damping(model%mass, model%stiffness, options%modal_damping, &
-                                model%damping, error, 2.0_wp*pi*options%modal_damping_up_to)
+         call move_alloc(model%damping, damping)
+         call damp_structure(model, model%stiffness, options%modal_damping, damping, error, &
+                             2.0_wp*pi*options%modal_damping_up_to)
+         call move_alloc(damping, model%damping)
       end if
       if (allocated(error)) return
       call find_changes(options, raw, wanted, model, error)
@@ -253,8 +256,8 @@ contains
          change%value = options%rayleigh_stiffness
       case (modal_damping)
          ! The damping of all modes is proportional to the ratio.
-         call add_modal_damping(model%mass, model%stiffness, 1.0_wp, change%damping, error, &
-                                2.0_wp*pi*options%modal_damping_up_to)
+         call damp_structure(model, model%stiffness, 1.0_wp, change%damping, error, &
+                             2.0_wp*pi*options%modal_damping_up_to)
          change%value = options%modal_damping
       case (loss_factor)
          change%stiffness = model%stiffness
@@ -341,8 +344,8 @@ contains
          stiffness = model%stiffness
          call growth%add_stiffness(even_powers(speed, n) - even_powers(options%rotation_speed, n), &
                                    stiffness)
-         call add_modal_damping(model%mass, stiffness, weight(k)/h*options%modal_damping, damping, &
-                                error, 2.0_wp*pi*options%modal_damping_up_to)
+         call damp_structure(model, stiffness, weight(k)/h*options%modal_damping, damping, &
+                             error, 2.0_wp*pi*options%modal_damping_up_to)
          if (allocated(error)) return
       end do
    end subroutine change_modal_damping

@@ -39,13 +39,12 @@ contains
       character(*), parameter :: of_population = "analysis = 'population'"
 
       call keys%open('population', 'the largest amplitude of disks whose blade frequencies differ')
-      call keys%bind(key('n_patterns', 'disks: the first patterns; 0: all that there are', &
+      call keys%bind(key('n_patterns', 'disks, the first patterns; 0: all', &
                          from_to(0, most_patterns)), self%n_patterns)
-      call keys%bind(key('peaks', 'look for maxima between the rows of the sweep'), self%peaks)
-      call keys%bind_word(key('quantity', 'which amplitude: of the first harmonic, or the '// &
-                              'largest deflection'), self%quantity, resonance_words)
-      call keys%bind(key('patterns', 'by which part the blade frequencies are above the tuned '// &
-                         'ones, pattern after pattern, each as mistuning%frequency', &
+      call keys%bind(key('peaks', 'look for maxima between the rows'), self%peaks)
+      call keys%bind_word(key('quantity', 'of the first harmonic, or the largest deflection'), &
+                          self%quantity, resonance_words)
+      call keys%bind(key('patterns', 'pattern after pattern, each as mistuning%frequency', &
                          shape=':', repeats=.false., absent='/mistuning/patterns of the file', &
                          only=of_population), self%patterns)
    end subroutine bind_keys

@@ -52,17 +52,17 @@ contains
       call keys%open('stress', 'stress and endurance of a cycle, of models with /stress')
       ! Where there are no points one value is told to be of none.
       call keys%set_size('n_stress', max(1, self%n_points))
-      call keys%bind_word(key('method', 'amplitude and mean by the largest von Mises stress '// &
-                              'between two instants, or of that stress with the sign of its '// &
-                              'trace'), self%method, method_words)
+      call keys%bind_word(key('method', &
+                              'by the largest von Mises stress between two instants, or with '// &
+                              'the sign of its trace'), self%method, method_words)
       call keys%bind_word(key('diagram', 'how amplitude and mean count together'), &
                           self%diagram, diagram_words)
-      call keys%bind(key('endurance', 'alternating stress that is endured', above(0.0_wp), &
-                         'F/L^2', 'n_stress', absent=of_model), self%endurance)
+      call keys%bind(key('endurance', 'alternating stress endured', above(0.0_wp), 'F/L^2', &
+                         'n_stress', absent=of_model), self%endurance)
       call keys%bind(key('ultimate', 'static strength', above(0.0_wp), 'F/L^2', 'n_stress', &
                          absent=of_model), self%ultimate)
-      call keys%bind_word(key('output', 'amplitude, mean and utilisation, Fourier '// &
-                              'coefficients of the components too, or nothing'), &
+      call keys%bind_word(key('output', &
+                              'amplitude, mean, utilisation; Fourier coefficients too; nothing'), &
                           self%output, output_words)
    end subroutine bind_keys
 

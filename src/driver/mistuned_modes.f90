@@ -2,17 +2,18 @@
 !> closed: every pair as its springs, which may differ from sector to sector, or held.
 module fw_mistuned_modes
    use fw_body, only: body_type
+   use fw_closed_joint, only: closed_joint
+   use fw_closed_pairs, only: add_springs
    use fw_cyclic_data, only: nodal_matrices
    use fw_deviation, only: mass_part, stiffness_part
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hermitian, only: congruence, product_of
    use fw_kinds, only: wp
    use fw_laws, only: build_law
-   use fw_natural_modes, only: add_springs, held_basis
    use fw_pair_law, only: pair_law
    use fw_ring_modes, only: ring_pencil
-   use fw_sector, only: add_sector_spring, sector_at, sector_rows
-   use fw_sector_relative, only: new_sector_relative, sector_relative
+   use fw_sector, only: add_sector_spring, close_sector, sector_at, sector_rows
+   use fw_sector_relative, only: held_basis, new_sector_relative, sector_relative
    implicit none (type, external)
    private
 
@@ -122,6 +123,7 @@ contains
       !> Ready to be solved.
       type(ring_pencil), intent(out) :: pencil
       type(error_type), allocatable, intent(out) :: error
+      type(closed_joint) :: springs
       type(nodal_matrices) :: nodal
       complex(wp), allocatable :: basis(:, :), pairs(:, :)
       real(wp), allocatable :: others(:, :)
@@ -151,13 +153,14 @@ contains
             pencil%stiffness(n_own + a, n_own + a, :) = rows%stiffness(differing(a), :) - &
                                                         mean(differing(a))
          end do
+         call add_springs(case%springs, cyclic%n_solved(), springs)
          do k = 0, n/2
             call sector_at(case%model, k, nodal, error)
             if (allocated(error)) return
             associate (wave => pencil%wave(k + 1))
                wave%stiffness = nodal%stiffness
                wave%mass = nodal%mass
-               call add_springs(case, k, wave%stiffness)
+               call close_sector(case%model, springs, k, wave%stiffness, basis)
                call sector_rows(case%model, k, rows%side_1, rows%side_2, rows%sector_2, pairs, &
                                 others)
                do a = 1, size(mean)

@@ -4,22 +4,19 @@
 module fw_natural_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_body, only: body_type
+   use fw_closed_joint, only: closed_joint
+   use fw_closed_pairs, only: add_pairs, add_springs
    use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hermitian, only: congruence, is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
-   use fw_laws, only: build_law
-   use fw_pair_law, only: pair_law
-   use fw_sector, only: add_sector_spring, sector_at, sector_rows
-   use fw_sector_relative, only: new_sector_relative, sector_relative
+   use fw_sector, only: close_sector, sector_at
    use fw_text, only: to_text
    use fw_whirl_modes, only: find_whirl, wave_matrices, wave_of
    implicit none (type, external)
    private
 
    public :: natural_modes, find_natural_modes
-   ! For those of all sectors.
-   public :: add_springs, held_basis
 
    !> Frequencies in ascending order [rad/s], NaN where there are fewer (n_modes, n_diameters).
    type :: natural_modes
@@ -85,26 +82,26 @@ contains
       type(natural_modes), intent(inout) :: modes
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices) :: nodal
-      type(sector_relative) :: relative
+      type(closed_joint) :: springs, pairs
       type(wave_matrices) :: wave
-      complex(wp), allocatable :: stiffness(:, :), held(:, :), basis(:, :)
+      complex(wp), allocatable :: stiffness(:, :), basis(:, :)
       integer :: k
 
       k = modes%nodal_diameter(place)
       call sector_at(case%model, abs(k), nodal, error)
       if (allocated(error)) return
       stiffness = nodal%stiffness
-      call add_springs(case, abs(k), stiffness)
+      call add_springs(case%springs, case%model%cyclic%n_solved(), springs)
+      call close_sector(case%model, springs, abs(k), stiffness, basis)
       call wave_of(nodal, stiffness, k < 0, wave)
       call list_waves(wave, modes%open(:, place), modes%open_damping(:, place))
       modes%closed(:, place) = modes%open(:, place)
       modes%closed_damping(:, place) = modes%open_damping(:, place)
       if (case%contact%n_pairs == 0) return
-      call close_pairs(case, abs(k), stiffness, held)
+      call add_pairs(case%contact, pairs)
+      call close_sector(case%model, pairs, abs(k), stiffness, basis)
       call wave_of(nodal, stiffness, k < 0, wave)
-      if (size(held, 1) > 0) then
-         call new_sector_relative(held, relative)
-         call held_basis(relative, size(nodal%mass, 1), basis)
+      if (allocated(basis)) then
          if (k < 0) basis = conjg(basis)
          wave%mass = congruence(basis, wave%mass, basis)
          wave%damping = congruence(basis, wave%damping, basis)
@@ -135,118 +132,29 @@ contains
       real(wp), intent(inout) :: open(:), closed(:)
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices) :: nodal
-      type(sector_relative) :: relative
-      complex(wp), allocatable :: stiffness(:, :), held(:, :), basis(:, :)
+      type(closed_joint) :: springs, pairs
+      complex(wp), allocatable :: stiffness(:, :), basis(:, :)
 
       call sector_at(case%model, k, nodal, error)
       if (allocated(error)) return
       stiffness = nodal%stiffness
-      call add_springs(case, k, stiffness)
+      call add_springs(case%springs, case%model%cyclic%n_solved(), springs)
+      call close_sector(case%model, springs, k, stiffness, basis)
       call list_frequencies(nodal%mass, stiffness, k, open, error)
       if (allocated(error)) return
       closed = open
       if (case%contact%n_pairs == 0) return
-      call close_pairs(case, k, stiffness, held)
-      if (size(held, 1) == 0) then
+      call add_pairs(case%contact, pairs)
+      call close_sector(case%model, pairs, k, stiffness, basis)
+      if (.not. allocated(basis)) then
          call list_frequencies(nodal%mass, stiffness, k, closed, error)
          return
       end if
       closed = ieee_value(1.0_wp, ieee_quiet_nan)
-      call new_sector_relative(held, relative)
-      call held_basis(relative, size(nodal%mass, 1), basis)
       if (size(basis, 2) == 0) return
       call list_frequencies(congruence(basis, nodal%mass, basis), &
                             congruence(basis, stiffness, basis), k, closed, error)
    end subroutine find_in_diameter
-
-   !> Springs that are linear.
-   subroutine add_springs(case, k, stiffness)
-      class(body_type), intent(in) :: case
-      integer, intent(in) :: k
-      complex(wp), intent(inout) :: stiffness(:, :)
-      complex(wp), allocatable :: rows(:, :)
-      integer :: i, n
-
-      associate (springs => case%springs)
-         if (springs%n_springs == 0) return
-         ! Those of all sectors are those of the first.
-         n = springs%n_springs/case%model%cyclic%n_solved()
-         call sector_rows(case%model, k, springs%side_1(:n), springs%side_2(:n), &
-                          springs%sector_2(:n), rows)
-         do i = 1, n
-            if (springs%power(i) /= 1) cycle
-            call add_sector_spring(rows(i, :), springs%coefficient(i), stiffness)
-         end do
-      end associate
-   end subroutine add_springs
-
-   !> Elastic pairs as springs; of all others the rows that they hold.
-   subroutine close_pairs(case, k, stiffness, held)
-      class(body_type), intent(in) :: case
-      integer, intent(in) :: k
-      complex(wp), intent(inout) :: stiffness(:, :)
-      complex(wp), allocatable, intent(out) :: held(:, :)
-      class(pair_law), allocatable :: law
-      complex(wp), allocatable :: rows(:, :)
-      logical, allocatable :: is_held(:)
-      integer :: c, i
-
-      associate (contact => case%contact)
-         call build_law(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0, law)
-         allocate (held(0, 0))
-         do c = 1, 3
-            call sector_rows(case%model, k, contact%side_1(c, :), contact%side_2(c, :), &
-                             contact%sector_2, rows)
-            allocate (is_held(contact%n_pairs))
-            is_held = contact%side_1(c, :) /= 0 .or. contact%side_2(c, :) /= 0
-            do i = 1, contact%n_pairs
-               if (.not. is_held(i)) cycle
-               if (law%prediction%takes(i) .or. law%prediction%order_of(i, c) > 0) cycle
-               call add_sector_spring(rows(i, :), law%prediction%stiffness(i, c), stiffness)
-               is_held(i) = .false.
-            end do
-            call join(rows, is_held, held)
-            deallocate (is_held)
-         end do
-      end associate
-   end subroutine close_pairs
-
-   pure subroutine join(rows, is_held, held)
-      complex(wp), intent(in) :: rows(:, :)
-      logical, intent(in) :: is_held(:)
-      complex(wp), allocatable, intent(inout) :: held(:, :)
-      complex(wp), allocatable :: longer(:, :)
-      integer :: i, n
-
-      n = size(held, 1)
-      allocate (longer(n + count(is_held), size(rows, 2)))
-      if (n > 0) longer(:n, :) = held
-      do i = 1, size(is_held)
-         if (.not. is_held(i)) cycle
-         n = n + 1
-         longer(n, :) = rows(i, :)
-      end do
-      call move_alloc(longer, held)
-   end subroutine join
-
-   !> Motions in which no held row moves.
-   pure subroutine held_basis(relative, n, basis)
-      type(sector_relative), intent(in) :: relative
-      integer, intent(in) :: n
-      complex(wp), allocatable, intent(out) :: basis(:, :)
-      integer :: j, n_free, n_rows
-
-      n_free = size(relative%free)
-      n_rows = n_free + size(relative%pivot)
-      allocate (basis(n, n - size(relative%pivot)), source=(0.0_wp, 0.0_wp))
-      basis(relative%pivot, :n_free) = -relative%r
-      do j = 1, n_free
-         basis(relative%free(j), j) = (1.0_wp, 0.0_wp)
-      end do
-      do j = 1, n - n_rows
-         basis(n_rows + j, n_free + j) = (1.0_wp, 0.0_wp)
-      end do
-   end subroutine held_basis
 
    !> The lowest frequencies, from M x = theta (K + s M) x: massless dofs, and a stiffness that
    !> holds the structure in part, are no exceptions.

@@ -80,8 +80,8 @@ module fw_remark_table
                   'histories, other methods and memory = ''carried''); steps of a session '// &
                   'keep one harmonic'), &
       remark_kind('unstable', &
-                  'coriolis, circulatory, unsymmetric or air forces: without contact the '// &
-                  'linear structure has a mode that grows'), &
+                  'without contact the linear structure has a mode that grows: coriolis, '// &
+                  'circulatory, unsymmetric or air forces'), &
       remark_kind('beyond reduction', &
                   'the highest harmonic of the highest frequency is above '// &
                   '/reduction/frequency of the model file'), &
@@ -169,6 +169,9 @@ module fw_remark_table
       remark_kind('no mode', &
                   'no natural frequency of the free, sliding or stuck structure lies in the '// &
                   'sweep: often Hz typed for rad/s'), &
+      remark_kind('repeated mode', &
+                  'analysis = ''ringdown'': another mode has the frequency of the one that is '// &
+                  'released, and its shape is one of many'), &
       remark_kind('undetermined mode', &
                   'a harmonic meets, to round-off, a mode without damping that no load '// &
                   'reaches, of the structure alone or (up to 400 dofs) with linear springs '// &

@@ -15,7 +15,7 @@ module fw_run_bounds
    use fw_point, only: point_type
    use fw_response_rows, only: is_of_pairs, wear_volume
    use fw_sensitivity_options, only: of_itself
-   use fw_share_search, only: share_point, share_search, share_solver
+   use fw_share_search, only: jumps, share_point, share_search, share_solver
    use fw_strategy, only: new_request, point_request, solver_memory
    use fw_sweep, only: sweep_places
    use fw_text, only: to_text
@@ -34,8 +34,12 @@ module fw_run_bounds
       type(point_request) :: request
       !> Responses that were solved at this frequency.
       integer :: n_solved = 0
+      !> Vibration in the middle, by its unknowns, and the first of these.
+      real(wp) :: size_of_motion = 0.0_wp
+      integer :: first = 1
    contains
       procedure :: solve => solve_on_the_way
+      procedure :: goes_on
       procedure :: put_shares
       procedure :: take
    end type balanced_shares
@@ -56,6 +60,10 @@ module fw_run_bounds
 
    !> Parts of the way between two sets of shares, at least.
    real(wp), parameter :: shortest_way = 0.125_wp
+   !> Longest and shortest step in shares where nothing may jump, and how much of the vibration one
+   !> may change.
+   real(wp), parameter :: longest_step = 0.125_wp, shortest_step = 2.0_wp**(-12)
+   real(wp), parameter :: part_of_motion = 0.05_wp
 
 contains
 
@@ -181,6 +189,10 @@ contains
          solver%request%contact = .false.
          solver%request%histories = .false.
          solver%request%cycle = .false.
+         associate (system => solver%strategy%level%system)
+            solver%first = size(centre%x)/system%problem%fourier%n_coefficients + 1
+         end associate
+         solver%size_of_motion = norm2(centre%x(solver%first:))
          call search%find(solver, centre, solver%one%bounds%n_starts, error)
          if (allocated(error)) return
          do i = 1, 2
@@ -189,7 +201,7 @@ contains
          end do
          group%range(3, row) = centre%value
          group%counts(:, row) = [solver%n_solved, search%n_failed]
-         if (search%n_failed > 0) call observer%on_message('no solution at '// &
+         if (search%n_failed > 0) call observer%on_message('the response folds before '// &
             to_text(search%n_failed)//' residual tractions, '//trim(solver%request%describe()))
          call go_back(solver, centre)
       end associate
@@ -207,21 +219,32 @@ contains
    end subroutine go_back
 
    !> From the response at other shares, by halves of the way where one step does not lead there.
-   subroutine solve_on_the_way(self, from, shares, found, done, error)
+   !> Careful, no step may change more than a small part of the vibration, however short: a fold or a
+   !> jump does, and ends the way.
+   subroutine solve_on_the_way(self, from, shares, way, done, error)
       class(balanced_shares), intent(inout) :: self
       type(share_point), intent(in) :: from
       real(wp), intent(in) :: shares(:)
-      type(share_point), intent(out) :: found
+      type(share_point), allocatable, intent(out) :: way(:)
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
-      type(share_point) :: here
+      type(share_point) :: found, here
       type(point_type) :: point
-      real(wp) :: at, step
+      real(wp) :: at, longest, shortest, step
 
+      allocate (way(0))
       done = .false.
       here = from
       at = 0.0_wp
-      step = 1.0_wp
+      longest = 1.0_wp
+      shortest = shortest_way
+      if (self%is_careful) then
+         associate (length => maxval(abs(shares - from%t)))
+            longest = min(1.0_wp, longest_step/length)
+            shortest = min(0.5_wp*longest, shortest_step/length)
+         end associate
+      end if
+      step = longest
       do while (at < 1.0_wp)
          call go_back(self, here)
          call self%put_shares(merge(shares, from%t + (at + step)*(shares - from%t), &
@@ -231,15 +254,31 @@ contains
          if (allocated(error)) return
          self%n_solved = self%n_solved + 1
          call self%take(point, found, done)
+         if (done) done = self%goes_on(here, found)
          if (done) then
             here = found
             at = min(1.0_wp, at + step)
+            if (self%is_careful .or. at >= 1.0_wp) way = [way, found]
+            if (self%is_careful) step = min(2.0_wp*step, longest)
          else
             step = 0.5_wp*step
-            if (step < shortest_way) return
+            if (step < shortest) return
          end if
       end do
    end subroutine solve_on_the_way
+
+   !> Whether two responses are on one branch.
+   pure logical function goes_on(self, from, to)
+      class(balanced_shares), intent(in) :: self
+      type(share_point), intent(in) :: from, to
+
+      if (self%is_careful) then
+         goes_on = norm2(to%x(self%first:) - from%x(self%first:)) <= &
+                   part_of_motion*self%size_of_motion
+      else
+         goes_on = .not. jumps(from, to)
+      end if
+   end function goes_on
 
    !> The shares of the problem that is solved, and of the case. The twin of the law that slopes are
    !> found by (fw_parameter_slopes) keeps its own, which those by shares do not depend on.
@@ -305,8 +344,9 @@ contains
                                to_text(n)//' frequencies')
          n_failed = sum(group%counts(2, :))
          if (n_failed > 0) call run%summary%remarks%add('bounds without solution', &
-            to_text(n_failed)//' residual tractions without a solution (/bounds/failed) are '// &
-            'no ends: the range may be wider there')
+            to_text(n_failed)//' residual tractions (/bounds/failed) lie behind a fold of the '// &
+            'response, or have none: the range is of those that a straight way from the '// &
+            'middle leads to')
          call run%writer%add(group, error)
       end associate
    end subroutine conclude

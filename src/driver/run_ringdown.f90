@@ -40,6 +40,8 @@ module fw_run_ringdown
       !> Of the stuck mode [rad/s], and its shape with the amplitude wanted (n_dof) [length].
       real(wp), private :: omega = 0.0_wp
       real(wp), allocatable, private :: shape(:)
+      !> Whether another mode has its frequency: the shape is one of many.
+      logical, private :: is_repeated = .false.
    contains
       procedure :: start
       procedure :: check
@@ -47,6 +49,8 @@ module fw_run_ringdown
 
    !> Part of its largest entry below which the observed quantity is at a node of the mode.
    real(wp), parameter :: node = 1.0e-8_wp
+   !> Frequencies nearer to each other than this part are one.
+   real(wp), parameter :: alike = 1.0e-6_wp
    !> Swings below this part of the amplitude are round-off.
    real(wp), parameter :: least_swing = 1.0e-12_wp
    !> Residual of the position at rest: the decay starts from it.
@@ -74,6 +78,10 @@ contains
                              'take fewer', error)
          if (.not. allocated(error)) call self%check(case, error)
          if (allocated(error)) return
+         if (self%is_repeated) call run%summary%remarks%add('repeated mode', '&ringdown '// &
+            'number = '//to_text(options%number)//': another mode with closed pairs stuck has '// &
+            'its frequency, and the shape of the release is one of many: decays of others '// &
+            'may differ with contact')
          call integrate_decay(self%structure, case%model%observe_matrix, self%omega, &
                               options%n_cycles, options%steps_per_period, self%state, &
                               group%time, group%observed, error, run%observer)
@@ -195,6 +203,7 @@ contains
          allocate (coordinates(size(modes%observe, 2)))
          call modes%undamped(number, coordinates)
          self%omega = modes%omega(number)
+         self%is_repeated = count(abs(modes%omega - self%omega) <= alike*self%omega) > 1
       end associate
       self%shape = real(matmul(modes%observe, coordinates), wp)
       observed = dot_product(case%model%observe_matrix(1, :), self%shape)
@@ -262,7 +271,9 @@ contains
       end associate
       associate (a => group%amplitude)
          ! Of what does not swing any more there is none.
-         group%damping_ratio = log(a(1, :m)/a(1, 3:m + 2))/(2.0_wp*pi)
+         group%damping_ratio = log(a(1, :m)/a(1, 3:m + 2))
+         ! Of a linear mode it is the fraction of critical damping, large ones included.
+         group%damping_ratio = group%damping_ratio/sqrt((2.0_wp*pi)**2 + group%damping_ratio**2)
       end associate
    end subroutine measure_swings
 

@@ -56,6 +56,8 @@ module fw_summary
       !> Places where stability changes, in words.
       type(string_type), allocatable :: bifurcation(:)
       type(string_type), allocatable :: work(:)
+      !> Whether modal damping is that of modes with stuck contact.
+      logical :: damps_stuck = .false.
       !> What the case did not need, in words.
       type(string_type), allocatable :: skipped(:)
       !> How contact was sampled; not allocated where the work is not described.
@@ -95,6 +97,7 @@ contains
       allocate (self%peak(size(self%name)), self%peak_place(size(self%name)), source=0.0_wp)
       if (case%over%is_wanted()) self%parameter = parameter_words(case%over%number)
       self%is_controlled = case%control%is_wanted()
+      self%damps_stuck = case%damps_modes .and. allocated(case%model%damped_joint)
       self%slides_steadily = case%contact%sliding == sliding_steady
       allocate (self%work(0), self%skipped(0))
    end function new_summary
@@ -448,6 +451,7 @@ contains
       call add_line(table, 'converged', to_text(state%n_converged)//' of '// &
                     to_text(state%n_points)//' points')
       call add_line(table, 'iterations', to_text(self%iterations))
+      if (self%damps_stuck) call add_line(table, 'modal damping', 'of modes with stuck contact')
       if (allocated(self%mode)) then
          do i = 1, size(self%mode)
             call append(table, self%mode(i)%text)

@@ -51,13 +51,15 @@ contains
 
       associate (unused => self, unused_closes => closes, constants => contact%constants)
          call constants%bind(keys, tangential_stiffness_key(), slides)
-         call constants%bind(keys, key('bouc_wen_exponent', 'n of abs(z)**n, 1 or 2: how '// &
-            'sharply the force turns to its limit', whole(1, 2), '', 'n_pairs', &
-            absent='of the file, else 1'), .false.)
-         call constants%bind(keys, key('bouc_wen_beta', 'shape of the loops: 0.5 unloads with '// &
-            'the tangential stiffness, 1 with twice of it from the limit', &
-            at_least(0.5_wp) .and. at_most(1.0_wp), '', 'n_pairs', &
-            absent='of the file, else 0.5'), .false.)
+         call constants%bind(keys, key('bouc_wen_exponent', &
+                                       'n of abs(z)**n: how sharp the turn to the limit is', &
+                                       whole(1, 2), '', 'n_pairs', absent='of the file, else 1'), &
+                             .false.)
+         call constants%bind(keys, key('bouc_wen_beta', &
+                                       '0.5 unloads with the tangential stiffness, 1 from the '// &
+                                       'limit with twice of it', &
+                                       at_least(0.5_wp) .and. at_most(1.0_wp), '', 'n_pairs', &
+                                       absent='of the file, else 0.5'), .false.)
       end associate
    end subroutine bind_keys
 

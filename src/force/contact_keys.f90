@@ -32,8 +32,8 @@ contains
       type(contact_type), intent(inout) :: contact
 
       call keys%open('contact', 'contact pairs, friction, gap, contact law')
-      call keys%bind(key('n_pairs', 'required with side_1; 0 switches the contact of a file off', &
-                         from_to(0, most), absent=of_file), contact%n_pairs)
+      call keys%bind(key('n_pairs', '0 switches the contact of a file off', from_to(0, most), &
+                         absent=of_file), contact%n_pairs)
       call keys%set_size('n_pairs', contact%n_pairs)
    end subroutine bind_pairs
 
@@ -63,9 +63,9 @@ contains
       numbers = [unilateral]
       if (allocated(contact%normal_law)) numbers = contact%normal_law
       if (size(numbers) == 0) numbers = [unilateral]
-      call keys%bind_words(key('normal_law', 'how pairs with a normal dof press: a spring, '// &
-                               'normal_coefficient d**normal_exponent, reference_force '// &
-                               'exp(d/decay_length), a table', shape='n_pairs', &
+      call keys%bind_words(key('normal_law', &
+                               'a spring, normal_coefficient d**normal_exponent, '// &
+                               'reference_force exp(d/decay_length), a table', shape='n_pairs', &
                                only="law = 'penalty', 'regularised'"), numbers, normal_words)
       if (allocated(contact%normal_law)) deallocate (contact%normal_law)
       if (all(numbers == unilateral)) return
@@ -90,16 +90,16 @@ contains
       needed = .false.
       if (allocated(contact%normal_law)) needed = any(contact%normal_law == table) .and. &
          contact%n_table > 0 .and. .not. allocated(contact%overclosure)
-      call keys%bind(key('overclosure', 'of the points, in ascending order', unit='L', &
-                         shape='n_table', repeats=.false., absent=of_file//', else required', &
-                         only=with_table), contact%overclosure, needed)
-      call keys%bind(key('force', 'of the points, from 0 up: linear between them, beyond the '// &
-                         'last with its slope', at_least(0.0_wp), 'F', 'n_table', &
+      call keys%bind(key('overclosure', 'of the points, ascending', unit='L', shape='n_table', &
                          repeats=.false., absent=of_file//', else required', only=with_table), &
-                     contact%table_force, needed)
-      call keys%bind(key('normal_per_area', 'normal_coefficient, reference_force and force are '// &
-                         'pressures: times area', only="normal_law other than 'unilateral'"), &
-                     contact%normal_per_area)
+                     contact%overclosure, needed)
+      call keys%bind(key('force', 'of the points, from 0 up; linear between and beyond', &
+                         at_least(0.0_wp), 'F', 'n_table', repeats=.false., &
+                         absent=of_file//', else required', only=with_table), contact%table_force, &
+                     needed)
+      call keys%bind(key('normal_per_area', &
+                         'constants of the normal law are pressures, times area', &
+                         only="normal_law other than 'unilateral'"), contact%normal_per_area)
    end subroutine bind_table
 
    !> Dofs of both sides; a pair between one side and the ground has no side 2.
@@ -109,16 +109,16 @@ contains
       !> Pairs were announced, and no file gave their dofs.
       logical, intent(in) :: needed
 
-      call keys%bind(key('side_1', 'dofs of t1, t2, n on one side; 0: none, negative: with its '// &
-                         'sign turned', &
+      call keys%bind(key('side_1', 'dofs of t1, t2, n on one side; 0: none, negative: turned', &
                          side_numbers(), shape='3 x n_pairs', &
                          absent='of the file, else required'), contact%side_1, needed)
-      call keys%bind(key('side_2', 'the same of the other side, 0: ground; the normal points '// &
-                         'from side 2 to side 1', side_numbers(), shape='3 x n_pairs', &
-                         absent=of_file), contact%side_2, default=0)
-      call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1: 1 is the '// &
-                         'next, -1 the one before', shape='n_pairs', absent=of_file, &
-                         only='&cyclic'), contact%sector_2, default=0)
+      call keys%bind(key('side_2', &
+                         'of the other side, 0: ground; the normal points from side 2 to side 1', &
+                         side_numbers(), shape='3 x n_pairs', absent=of_file), contact%side_2, &
+                     default=0)
+      call keys%bind(key('sector_2', 'of side 2: 1 is the next, -1 the one before', &
+                         shape='n_pairs', absent=of_file, only='&cyclic'), contact%sector_2, &
+                     default=0)
    end subroutine bind_sides
 
    !> Friction coefficients; only pairs with tangential dofs need one.
@@ -139,10 +139,10 @@ contains
       type(contact_type), intent(inout) :: contact
       logical, intent(in) :: needs_area
 
-      call keys%bind(key('gap', 'initial gap; negative: interference, which preloads', &
-                         unit='L', shape='n_pairs', absent=of_file), contact%gap, default=0.0_wp)
-      call keys%bind(key('area', 'of a pair: from contact forces to pressure', above(0.0_wp), &
-                         'L^2', 'n_pairs', absent='of the file, else required for wear, per area', &
+      call keys%bind(key('gap', 'initial; negative: interference', unit='L', shape='n_pairs', &
+                         absent=of_file), contact%gap, default=0.0_wp)
+      call keys%bind(key('area', 'of a pair', above(0.0_wp), 'L^2', 'n_pairs', &
+                         absent='of the file, else required for wear, per area', &
                          only="analysis = 'wear', normal_per_area"), contact%area, needs_area)
    end subroutine bind_gap
 
@@ -152,8 +152,8 @@ contains
       type(contact_type), intent(inout) :: contact
       logical, intent(in) :: needed
 
-      call keys%bind(key('normal_load', 'constant compressive force', at_least(0.0_wp), 'F', &
-                         'n_pairs', absent=of_file//', else required with friction', &
+      call keys%bind(key('normal_load', 'constant, compressive', at_least(0.0_wp), 'F', 'n_pairs', &
+                         absent=of_file//', else required with friction', &
                          only='pairs without a normal dof'), contact%normal_load, needed)
    end subroutine bind_normal_load
 
@@ -163,12 +163,11 @@ contains
       type(contact_type), intent(inout) :: contact
       character(*), parameter :: with_speed = 'rotation_speed, speed_order, campbell'
 
-      call keys%bind(key('gap_rotation', 'added to gap, for each (rad/s)^2 of the rotation speed', &
+      call keys%bind(key('gap_rotation', 'added to gap for each (rad/s)^2 of the speed', &
                          unit='L s^2', shape='n_pairs', absent=of_file//', else none', &
                          only=with_speed), contact%gap_rotation)
-      call keys%bind(key('normal_load_rotation', 'added to normal_load, for each (rad/s)^2 of '// &
-                         'the rotation speed', unit='F s^2', shape='n_pairs', &
-                         absent=of_file//', else none', only=with_speed), &
+      call keys%bind(key('normal_load_rotation', 'the same of normal_load', unit='F s^2', &
+                         shape='n_pairs', absent=of_file//', else none', only=with_speed), &
                      contact%normal_load_rotation)
    end subroutine bind_growth
 
@@ -232,19 +231,20 @@ contains
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
 
-      call keys%bind(key('penalty_scale', 'multiplies the automatic eps of the rigid laws', &
-                         above(0.0_wp), only="law = 'dlft', 'dlft_velocity', 'rigid'"), &
-                     contact%penalty_scale)
-      call keys%bind_word(key('memory', 'where pairs that never slip start: unstrained, as the '// &
-                              'last point ended, or with the traction that residual says'), &
-                          contact%memory, memory_words)
-      call keys%bind(slider_key('slider_1', 'displacement along t1 where an assembled pair is '// &
-                            'unstrained; of those that never slip'), contact%slider_1)
+      call keys%bind(key('penalty_scale', 'multiplies eps of rigid laws', above(0.0_wp), &
+                         only="law = 'dlft', 'dlft_velocity', 'rigid'"), contact%penalty_scale)
+      call keys%bind_word(key('memory', &
+                              'pairs that never slip start unstrained, as the last point '// &
+                              'ended, or with residual'), contact%memory, memory_words)
+      call keys%bind(slider_key('slider_1', &
+                                'displacement along t1 where a pair that never slips is '// &
+                                'unstrained'), contact%slider_1)
       call keys%bind(slider_key('slider_2', 'the same along t2'), contact%slider_2)
-      call keys%bind(key('residual', 'residual traction of pairs that never slip: -1 and 1 are '// &
-                         'the ends of what balances, 0 is between them', from_to(-1.0_wp, 1.0_wp), &
-                         shape='n_pairs', absent='of the file, else 0', &
-                         only="memory = 'residual'"), contact%residual)
+      call keys%bind(key('residual', &
+                         'traction of pairs that never slip: -1 and 1 are the ends of what '// &
+                         'balances, 0 is between', from_to(-1.0_wp, 1.0_wp), shape='n_pairs', &
+                         absent='of the file, else 0', only="memory = 'residual'"), &
+                     contact%residual)
 
    contains
 
@@ -263,10 +263,11 @@ contains
       character(:), allocatable, intent(inout) :: path
       integer, intent(inout) :: step
 
-      call keys%bind(key('worn', 'result file of a wear run: start from the depths that it '// &
-                         'ends with, on top of gap', absent='none'), path)
-      call keys%bind(key('worn_step', 'row of its /wear/depth, counted from 1; 0: the last', &
-                         at_least(0), only='worn'), step)
+      call keys%bind(key('worn', &
+                         'result of a wear run: start from its last depths, on top of gap', &
+                         absent='none'), path)
+      call keys%bind(key('worn_step', 'row of its /wear/depth, from 1; 0: the last', at_least(0), &
+                         only='worn'), step)
    end subroutine bind_worn
 
    !> The number of springs, which becomes the size 'n_springs' of all arrays of the group.
@@ -275,8 +276,8 @@ contains
       type(spring_type), intent(inout) :: springs
 
       call keys%open('spring', 'nonlinear springs')
-      call keys%bind(key('n_springs', 'required with coefficient; 0 switches the springs of a '// &
-                         'file off', from_to(0, most), absent=of_file), springs%n_springs)
+      call keys%bind(key('n_springs', '0 switches the springs of a file off', from_to(0, most), &
+                         absent=of_file), springs%n_springs)
       call keys%set_size('n_springs', springs%n_springs)
    end subroutine bind_n_springs
 
@@ -291,9 +292,8 @@ contains
                          absent='of the file, else required'), springs%side_1, needed)
       call keys%bind(key('side_2', 'dof on the other side, 0: ground', side_numbers(), &
                          shape='n_springs', absent=of_file), springs%side_2, default=0)
-      call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1', &
-                         shape='n_springs', absent=of_file, only='&cyclic'), &
-                     springs%sector_2, default=0)
+      call keys%bind(key('sector_2', 'of side 2, counted from that of side 1', shape='n_springs', &
+                         absent=of_file, only='&cyclic'), springs%sector_2, default=0)
       call keys%bind(key('coefficient', 'force = coefficient * elongation**power', &
                          unit='F/L^power', shape='n_springs', &
                          absent='of the file, else required'), springs%coefficient, needed)

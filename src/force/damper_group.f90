@@ -80,8 +80,8 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('damper', 'nonlinear dampers')
-      call keys%bind(key('n_dampers', 'required with coefficient; 0 switches the dampers of a '// &
-                         'file off', from_to(0, most), absent=of_file), self%n_given)
+      call keys%bind(key('n_dampers', '0 switches the dampers of a file off', from_to(0, most), &
+                         absent=of_file), self%n_given)
       call keys%set_size('n_dampers', self%n_given)
    end subroutine bind_count
 
@@ -95,12 +95,12 @@ contains
                          absent=or_needed), self%side_1, needed)
       call keys%bind(key('side_2', 'dof on the other side, 0: ground', side_numbers(), &
                          shape='n_dampers', absent=of_file), self%side_2, default=0)
-      call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1', &
-                         shape='n_dampers', absent=of_file, only='&cyclic'), self%sector_2, &
-                     default=0)
-      call keys%bind(key('coefficient', 'c of the force c u**position_power '// &
-                         'abs(v)**(power - 1) v, v = du/dt', shape='n_dampers', absent=or_needed), &
-                     self%coefficient, self%n_given > 0 .and. .not. allocated(self%coefficient))
+      call keys%bind(key('sector_2', 'of side 2, counted from that of side 1', shape='n_dampers', &
+                         absent=of_file, only='&cyclic'), self%sector_2, default=0)
+      call keys%bind(key('coefficient', &
+                         'c of c u**position_power abs(v)**(power - 1) v, v = du/dt', &
+                         shape='n_dampers', absent=or_needed), self%coefficient, &
+                     self%n_given > 0 .and. .not. allocated(self%coefficient))
       call keys%bind(key('power', 'of the velocity: 1 viscous, 2 drag', &
                          at_least(1.0_wp) .and. at_most(real(most_power, wp)), &
                          shape='n_dampers', absent=of_file), self%power, default=1.0_wp)

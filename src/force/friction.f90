@@ -142,15 +142,13 @@ contains
    end subroutine take_constants
 
    !> Pressure along a curve is taken at instants, and has no polynomial pieces between events.
-   !> Perturbations and motions in time know it where nothing rubs. Anchors that are carried along
-   !> in two directions are so from instant to instant.
+   !> Perturbations and motions in time know it where nothing rubs.
    subroutine take_facts(self, contact)
       class(friction_law), intent(inout) :: self
       type(contact_type), intent(in) :: contact
 
       if (contact%slides()) then
          self%facts%is_odd = .false.
-         self%facts%has_events = .not. has_two_directions(contact)
          self%facts%has_multipliers = .false.
       end if
       if (self%prediction%takes_balance .or. .not. any(curved_pairs(contact))) return
@@ -160,15 +158,6 @@ contains
       self%facts%has_multipliers = self%facts%acts_at_once
       self%facts%is_integrated = self%facts%acts_at_once
    end subroutine take_facts
-
-   !> Whether some pairs have two tangential directions.
-   pure logical function has_two_directions(contact) result(has)
-      type(contact_type), intent(in) :: contact
-      logical :: used(2, contact%n_pairs)
-
-      used = contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0
-      has = any(all(used, dim=1))
-   end function has_two_directions
 
    !> Blocks of pairs are marched together, so that all arrays run over the pairs first.
    subroutine reserve(self, fourier, work)

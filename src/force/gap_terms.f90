@@ -40,22 +40,22 @@ contains
       class(key_visitor), intent(inout) :: keys
       logical :: needed
 
-      call keys%bind(key('n_gap_terms', 'what moves the obstacle, or makes it uneven: terms '// &
-                         'added to gap', from_to(0, most_terms)), self%n_terms)
+      call keys%bind(key('n_gap_terms', 'terms added to gap: obstacles that move or are uneven', &
+                         from_to(0, most_terms)), self%n_terms)
       call keys%set_size('n_gap_terms', self%n_terms)
       needed = self%n_terms > 0
-      call keys%bind(key('gap_pair', 'pair, from 1; 0: all', from_to(0, most_terms), &
+      call keys%bind(key('gap_pair', 'from 1; 0: all', from_to(0, most_terms), &
                          shape='n_gap_terms'), self%pair, default=0)
       call keys%bind(key('gap_harmonic', 'harmonic, 0 to n_harmonics', &
                          from_to(0, most_harmonic), shape='n_gap_terms', &
                          absent='1, or by gap_order'), self%harmonic)
-      call keys%bind(key('gap_order', 'orders in place of harmonics: the frequency of the '// &
-                         'sweep is their greatest common divisor times the speed', &
-                         from_to(0, most_harmonic), shape='n_gap_terms', &
-                         absent='gap_harmonic'), self%order)
-      call keys%bind(key('gap_amplitude', 'amplitude; where it is positive the gap is widest '// &
-                         'at n tau = -gap_phase', unit='L', shape='n_gap_terms', &
-                         absent='required with n_gap_terms'), self%amplitude, needed)
+      call keys%bind(key('gap_order', &
+                         'in place of harmonics: the frequency is their greatest common '// &
+                         'divisor times the speed', from_to(0, most_harmonic), &
+                         shape='n_gap_terms', absent='gap_harmonic'), self%order)
+      call keys%bind(key('gap_amplitude', 'widest at n tau = -gap_phase', unit='L', &
+                         shape='n_gap_terms', absent='required with n_gap_terms'), self%amplitude, &
+                     needed)
       call keys%bind(key('gap_phase', 'of cos(n tau + phase)', unit='degrees', &
                          shape='n_gap_terms'), self%phase, default=0.0_wp)
    end subroutine bind_keys

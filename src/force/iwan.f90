@@ -51,12 +51,15 @@ contains
 
       associate (unused => self, unused_closes => closes, constants => contact%constants)
          call constants%bind(keys, tangential_stiffness_key(), slides)
-         call constants%bind(keys, key('iwan_chi', 'exponent of the sliding limits: the work '// &
-            'of a small cycle grows with amplitude**(chi + 3)', above(-1.0_wp), '', 'n_pairs', &
-            absent='of the file, else required with tangential dofs'), slides)
-         call constants%bind(keys, key('iwan_beta', 'stiffness that is lost at once where the '// &
-            'last elements slip, over that lost before', at_least(0.0_wp), '', 'n_pairs', &
-            absent='of the file, else 0'), .false.)
+         call constants%bind(keys, key('iwan_chi', &
+                                       'work of a small cycle grows with amplitude**(chi + 3)', &
+                                       above(-1.0_wp), '', 'n_pairs', &
+                                       absent='of the file, else required with tangential dofs'), &
+                             slides)
+         call constants%bind(keys, key('iwan_beta', &
+                                       'stiffness lost where the last elements slip, over that '// &
+                                       'lost before', at_least(0.0_wp), '', 'n_pairs', &
+                                       absent='of the file, else 0'), .false.)
       end associate
    end subroutine bind_keys
 

@@ -24,7 +24,7 @@ module fw_laws
                         'iwan', 'bouc_wen']
    !> What they are, in the same order, for the key `law` (160 characters).
    character(*), parameter :: law_help = 'rigid, rigid at velocity level, elastic, rigid of '// &
-      'high order (friction on dofs with mass), smooth in the velocity, joints of Iwan, of Bouc-Wen'
+      'high order (friction on mass), smooth in the velocity, joints of Iwan, of Bouc-Wen'
 
 contains
 

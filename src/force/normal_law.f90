@@ -74,17 +74,22 @@ contains
       presses = any(pairs_with(contact, power))
       decays = any(pairs_with(contact, exponential))
       associate (constants => contact%constants)
-         call constants%bind(keys, key('normal_coefficient', "c of normal_law = 'power', "// &
-            'pressure c d**e of the overclosure d; 0 for pairs of others', at_least(0.0_wp), &
-            'F/L^e', 'n_pairs', absent="of the file, else required with 'power'"), presses)
-         call constants%bind(keys, key('normal_exponent', "e of normal_law = 'power': 1.5 Hertz", &
-            at_least(1.0_wp), '', 'n_pairs', absent='of the file, else 1.5'), .false.)
-         call constants%bind(keys, key('reference_force', "p_0 of normal_law = 'exponential', "// &
-            'pressure p_0 exp(d/h); 0 for pairs of others', at_least(0.0_wp), 'F', 'n_pairs', &
-            absent="of the file, else required with 'exponential'"), decays)
-         call constants%bind(keys, key('decay_length', "h of normal_law = 'exponential'; 0 for "// &
-            'pairs of others', at_least(0.0_wp), 'L', 'n_pairs', &
-            absent="of the file, else required with 'exponential'"), decays)
+         call constants%bind(keys, key('normal_coefficient', &
+                                       'c of the pressure c d**e, d the overclosure; 0 for '// &
+                                       'pairs of other laws', at_least(0.0_wp), 'F/L^e', &
+                                       'n_pairs', &
+                                       absent="of the file, else required with 'power'"), presses)
+         call constants%bind(keys, key('normal_exponent', 'e of it; 1.5: Hertz', at_least(1.0_wp), &
+                                       '', 'n_pairs', absent='of the file, else 1.5'), .false.)
+         call constants%bind(keys, key('reference_force', &
+                                       'p_0 of the pressure p_0 exp(d/h); 0 for pairs of other '// &
+                                       'laws', at_least(0.0_wp), 'F', 'n_pairs', &
+                                       absent="of the file, else required with 'exponential'"), &
+                             decays)
+         call constants%bind(keys, key('decay_length', 'h of it; 0 for pairs of other laws', &
+                                       at_least(0.0_wp), 'L', 'n_pairs', &
+                                       absent="of the file, else required with 'exponential'"), &
+                             decays)
       end associate
    end subroutine bind_normal_constants
 

@@ -158,16 +158,16 @@ contains
 
    !> The key of what presses elastic pairs together, which several laws have.
    pure type(key_type) function normal_stiffness_key()
-      normal_stiffness_key = key('normal_stiffness', 'contact stiffness; 0 without a normal '// &
-                                 'dof', at_least(0.0_wp), 'F/L', 'n_pairs', &
+      normal_stiffness_key = key('normal_stiffness', '0 without a normal dof', at_least(0.0_wp), &
+                                 'F/L', 'n_pairs', &
                                  absent='of the file, else required with normal dofs')
    end function normal_stiffness_key
 
    !> The key of what holds pairs tangentially, which several laws have.
    pure type(key_type) function tangential_stiffness_key()
-      tangential_stiffness_key = key('tangential_stiffness', 'contact stiffness; 0 with a '// &
-                                     'parallel pair that has one, or without a tangential dof', &
-                                     at_least(0.0_wp), 'F/L', 'n_pairs', &
+      tangential_stiffness_key = key('tangential_stiffness', &
+                                     '0 beside a parallel pair that has one', at_least(0.0_wp), &
+                                     'F/L', 'n_pairs', &
                                      absent='of the file, else required with tangential dofs')
    end function tangential_stiffness_key
 
@@ -176,8 +176,10 @@ contains
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
 
-      call contact%constants%bind(keys, key('speed_1', 'velocity of side 2 along t1: a belt, a '// &
-         'disk or a casing', unit='L/s', shape='n_pairs', absent='of the file, else 0'), .false.)
+      call contact%constants%bind(keys, key('speed_1', &
+                                            'velocity of side 2 along t1: a belt, disk, casing', &
+                                            unit='L/s', shape='n_pairs', &
+                                            absent='of the file, else 0'), .false.)
       call contact%constants%bind(keys, key('speed_2', 'the same along t2', unit='L/s', &
          shape='n_pairs', absent='of the file, else 0'), .false.)
    end subroutine bind_speeds

@@ -74,8 +74,8 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('polynomial', 'forces that are polynomials of several dofs')
-      call keys%bind(key('n_terms', 'required with factors; 0 switches the terms of a file off', &
-                         from_to(0, most), absent=of_file), self%n_given)
+      call keys%bind(key('n_terms', '0 switches the terms of a file off', from_to(0, most), &
+                         absent=of_file), self%n_given)
       call keys%set_size('n_terms', self%n_given)
    end subroutine bind_count
 
@@ -85,20 +85,17 @@ contains
       logical :: needed
 
       needed = self%n_given > 0 .and. .not. allocated(self%factors)
-      call keys%bind_word(key('of', 'what the terms are: a potential, whose gradient the '// &
-                              'forces are, or a force on one dof each', absent=of_file), &
-                          self%of, of_words)
-      call keys%bind(key('factors', 'signed dofs that a term is the product of, repeated for '// &
-                         'powers; 0: none', side_numbers(), shape='8 x n_terms', repeats=.false., &
-                         absent=or_needed), self%factors, needed)
-      call keys%bind(key('coefficient', 'of the terms; force = coefficient * product of the '// &
-                         'factors, or that is a potential', shape='n_terms', repeats=.false., &
+      call keys%bind_word(key('of', 'terms are a potential, or a force on one dof each', &
+                              absent=of_file), self%of, of_words)
+      call keys%bind(key('factors', 'dofs of the product, repeated for powers; 0: none', &
+                         side_numbers(), shape='8 x n_terms', repeats=.false., absent=or_needed), &
+                     self%factors, needed)
+      call keys%bind(key('coefficient', 'of each product', shape='n_terms', repeats=.false., &
                          absent=or_needed), self%coefficient, needed)
-      call keys%bind(key('dof', 'dof that the force of a term acts on, on the side of the '// &
-                         'stiffness', side_numbers(), shape='n_terms', repeats=.false., &
-                         absent=or_needed, only="of = 'force'"), &
-                     self%dof, self%n_given > 0 .and. self%of == of_force .and. &
-                     .not. allocated(self%dof))
+      call keys%bind(key('dof', 'that the force acts on, on the side of the stiffness', &
+                         side_numbers(), shape='n_terms', repeats=.false., absent=or_needed, &
+                         only="of = 'force'"), self%dof, &
+                     self%n_given > 0 .and. self%of == of_force .and. .not. allocated(self%dof))
    end subroutine bind_keys
 
    pure integer function n_held(self)

@@ -85,24 +85,26 @@ contains
 
       associate (unused => self)
       end associate
-      call contact%constants%bind(keys, key('slip_speed', 'sliding velocity du/dt at which '// &
-         'tanh(1) = 76 % of the friction acts', above(0.0_wp), 'L/s', 'n_pairs', &
-         absent='of the file, else required with tangential dofs'), slides)
+      call contact%constants%bind(keys, key('slip_speed', &
+                                            'sliding velocity at which tanh(1) = 76 % of the '// &
+                                            'friction acts', above(0.0_wp), 'L/s', 'n_pairs', &
+                                            absent='of the file, else required with tangential '// &
+                                                   'dofs'), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
       call bind_normal_constants(keys, contact)
       associate (constants => contact%constants)
-         call constants%bind(keys, key('mu_dynamic', 'friction coefficient of fast sliding, '// &
-            'to which mu falls', at_least(0.0_wp), '', 'n_pairs', &
-            absent='of the file, else mu'), .false.)
-         call constants%bind(keys, key('weakening_speed', 'over which friction falls from mu '// &
-            'to mu_dynamic', above(0.0_wp), 'L/s', 'n_pairs', &
-            absent='of the file, else required with mu_dynamic'), &
-            constants%has('mu_dynamic'))
-         call constants%bind(keys, key('weakening_exponent', 'of the speed in exp(-(v/'// &
-            'weakening_speed)**e)', at_least(1.0_wp) .and. at_most(2.0_wp), '', 'n_pairs', &
-            absent='of the file, else 1'), .false.)
-         call constants%bind(keys, key('mu_viscous', 'what mu gains with the sliding speed', &
-            at_least(0.0_wp), 's/L', 'n_pairs', absent='of the file, else 0'), .false.)
+         call constants%bind(keys, key('mu_dynamic', 'mu of fast sliding', at_least(0.0_wp), '', &
+                                       'n_pairs', absent='of the file, else mu'), .false.)
+         call constants%bind(keys, key('weakening_speed', 'over which mu falls to mu_dynamic', &
+                                       above(0.0_wp), 'L/s', 'n_pairs', &
+                                       absent='of the file, else required with mu_dynamic'), &
+                             constants%has('mu_dynamic'))
+         call constants%bind(keys, key('weakening_exponent', 'e of exp(-(v/weakening_speed)**e)', &
+                                       at_least(1.0_wp) .and. at_most(2.0_wp), '', 'n_pairs', &
+                                       absent='of the file, else 1'), .false.)
+         call constants%bind(keys, key('mu_viscous', 'gain of mu with the sliding speed', &
+                                       at_least(0.0_wp), 's/L', 'n_pairs', &
+                                       absent='of the file, else 0'), .false.)
       end associate
       call bind_speeds(keys, contact)
    end subroutine bind_keys

@@ -100,35 +100,36 @@ contains
       logical :: needed
 
       needed = self%n_given > 0
-      call keys%bind(key('library', 'shared library with the functions, relative to the '// &
-                         'namelist', absent='required with n_elements'), self%library, needed)
-      call keys%bind_list(key('symbol', 'name of the function, one for all or one for each '// &
-                              'element', absent='required with n_elements'), &
-                          'names of functions', most, self%symbol, is_text)
-      call keys%bind(key('n_in', 'displacements that each element takes', &
-                         from_to(1, most_inputs)), self%inputs)
+      call keys%bind(key('library', 'with the functions, relative to the namelist', &
+                         absent='required with n_elements'), self%library, needed)
+      call keys%bind_list(key('symbol', 'function of all elements, or of each', &
+                              absent='required with n_elements'), 'names of functions', most, &
+                          self%symbol, is_text)
+      call keys%bind(key('n_in', 'displacements of each element', from_to(1, most_inputs)), &
+                     self%inputs)
       call keys%set_size('n_in', self%inputs)
       call keys%bind(key('side_1', 'dofs of its inputs', side_numbers(), &
                          shape='n_in x n_elements', repeats=.false., &
                          absent='required with n_elements'), self%side_1, needed)
       call keys%bind(key('side_2', 'dofs on the other side, 0: ground', side_numbers(), &
                          shape='n_in x n_elements', repeats=.false.), self%side_2, default=0)
-      call keys%bind(key('n_parameters', 'constants that each function gets', from_to(0, most)), &
+      call keys%bind(key('n_parameters', 'constants of each function', from_to(0, most)), &
                      self%n_parameters)
       call keys%set_size('n_par', self%n_parameters)
-      call keys%bind(key('parameters', 'the constants, n_par = n_parameters of each element', &
-                         shape='n_par x n_elements', &
-                         repeats=.false., absent='required with n_parameters'), &
-                     self%parameters, needed .and. self%n_parameters > 0)
-      call keys%bind_word(key('derivative', 'whether functions give slopes, or differences '// &
-                              'stand for them'), self%derivative, derivative_words)
-      call keys%bind(key('odd', 'opposite motions have opposite forces: you promise it'), self%odd)
+      call keys%bind(key('parameters', 'n_par = n_parameters of each element', &
+                         shape='n_par x n_elements', repeats=.false., &
+                         absent='required with n_parameters'), self%parameters, &
+                     needed .and. self%n_parameters > 0)
+      call keys%bind_word(key('derivative', &
+                              'functions give slopes, or differences stand for them'), &
+                          self%derivative, derivative_words)
+      call keys%bind(key('odd', 'you promise that opposite motions have opposite forces'), self%odd)
       call keys%bind(key('thread_safe', 'functions may be called from several threads'), &
                      self%thread_safe)
-      call keys%bind(key('check', 'functions are tried before the run: slopes, symmetry, memory'), &
+      call keys%bind(key('check', 'try functions before the run: slopes, symmetry, memory'), &
                      self%check)
-      call keys%bind(key('check_tolerance', 'what slopes and odd forces may be off, relative', &
-                         above(0.0_wp), only='check'), self%check_tolerance)
+      call keys%bind(key('check_tolerance', 'of slopes and odd forces, relative', above(0.0_wp), &
+                         only='check'), self%check_tolerance)
    end subroutine bind_keys
 
    !> Nothing of it stands in a model file.

@@ -26,6 +26,7 @@ module fw_read_case
    use fw_read_output, only: read_control, read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
    use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
+   use fw_read_stuck, only: check_damped_joint, take_damped_joint
    use fw_read_worn, only: read_worn
    use fw_reader, only: reader_type, new_reader
    use fw_reader_text, only: printable
@@ -291,6 +292,7 @@ contains
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep, case%over)
       if (.not. reader%failed()) call check_order(reader, case)
+      call check_damped_joint(reader, case)
       if (.not. reader%failed()) call vary_matrices(case, error)
       if (allocated(error)) return
       call case%solver%bind_keys(reader)
@@ -535,6 +537,7 @@ contains
          'base', 'n_terms', '= '//to_text(raw%base%n_terms)//' makes loads of the matrices of '// &
          'the case (dof, or direction beside coriolis): parameters that change these do not go '// &
          'with it; use direction without coriolis, or load%harmonic_scale')
+      call take_damped_joint(reader, options, case)
       call finish_model(reader, options, raw, terms, case%model, case%origin, error, wanted)
       if (raw%bodies%count() > 0) case%bodies = raw%bodies
       if (.not. allocated(case%title)) then

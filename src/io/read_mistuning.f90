@@ -57,28 +57,28 @@ contains
       call keys%bind(key('n_rows', 'blade modes whose frequencies differ', from_to(0, most_rows), &
                          absent='of the file'), self%n_rows)
       call keys%set_size('n_rows', self%n_rows)
-      call keys%bind(key('rows', 'their rows, one after another: W of the guide', &
-                         unit='M^0.5', shape='n_dof x n_rows', repeats=.false., absent=of_file), &
-                     self%rows)
+      call keys%bind(key('rows', 'one after another: W of the guide', unit='M^0.5', &
+                         shape='n_dof x n_rows', repeats=.false., absent=of_file), self%rows)
       call keys%bind(key('row_omega', 'their frequencies, blade alone', above(0.0_wp), &
                          unit='rad/s', shape='n_rows', repeats=.false., absent=of_file), &
                      self%row_omega)
-      call keys%bind(key('frequency', 'by which part the frequencies of each blade are above '// &
-                         'the tuned ones: n_sectors values, or all rows of each sector', &
-                         shape=each, repeats=.false., absent=of_file, only=where_used), &
-                     self%frequency)
-      call keys%bind(key('damping_ratio', 'damping ratios of each blade above the tuned ones, '// &
-                         'likewise', shape=each, repeats=.false., absent=of_file, &
-                         only=where_used), self%damping_ratio)
-      call keys%bind(key('stiffness', 'by which part the stiffness of each blade is above the '// &
-                         'tuned one: n_sectors values', shape=each, repeats=.false., &
-                         absent=of_file, only=where_used), self%stiffness)
+      call keys%bind(key('frequency', &
+                         'part by which frequencies of each blade are above the tuned ones: '// &
+                         'n_sectors values, or all rows of each sector', shape=each, &
+                         repeats=.false., absent=of_file, only=where_used), self%frequency)
+      call keys%bind(key('damping_ratio', &
+                         'what the damping ratios are above the tuned ones, likewise', shape=each, &
+                         repeats=.false., absent=of_file, only=where_used), self%damping_ratio)
+      call keys%bind(key('stiffness', &
+                         'part by which the stiffness of each blade is above the tuned one: '// &
+                         'n_sectors values', shape=each, repeats=.false., absent=of_file, &
+                         only=where_used), self%stiffness)
       call keys%bind(key('mass', 'the same of its mass', shape=each, repeats=.false., &
                          absent=of_file, only=where_used), self%mass)
-      call keys%bind(key('blade_stiffness', 'stiffness of the blade alone, symmetric', unit='F/L', &
+      call keys%bind(key('blade_stiffness', 'of the blade alone, symmetric', unit='F/L', &
                          shape=square, repeats=.false., absent=of_file), self%blade_stiffness)
-      call keys%bind(key('blade_mass', 'mass of the blade alone, symmetric', unit='M', &
-                         shape=square, repeats=.false., absent=of_file), self%blade_mass)
+      call keys%bind(key('blade_mass', 'of the blade alone, symmetric', unit='M', shape=square, &
+                         repeats=.false., absent=of_file), self%blade_mass)
       call keys%bind(key('scale', 'multiplies all deviations', only=where_used), self%scale)
    end subroutine bind_keys
 

@@ -31,6 +31,7 @@ contains
       real(wp), intent(in) :: static(:)
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices) :: nodal
       integer :: k, n
 
       if (reader%failed()) return
@@ -42,11 +43,15 @@ contains
             if (.not. allocated(parts%mass)) cycle
             call check_diameter(reader, parts, k, raw%cyclic%n_sectors)
             if (reader%failed()) return
-            call put_together(reader, options, raw, parts, model%cyclic%nodal(k + 1), error)
-            if (allocated(error)) return
-            call add_waves(options, static, model, model%cyclic%nodal(k + 1))
-            if (allocated(parts%stress)) model%cyclic%nodal(k + 1)%stress = transpose(reshape( &
+            call put_together(reader, options, raw, parts, nodal)
+            if (options%modal_damping > 0.0_wp) then
+               call damp_modes(model, k, options%modal_damping, nodal, error)
+               if (allocated(error)) return
+            end if
+            call add_waves(options, static, model, nodal)
+            if (allocated(parts%stress)) nodal%stress = transpose(reshape( &
                parts%stress, [size(parts%stress, 1), 6*size(parts%stress, 3)]))
+            model%cyclic%nodal(k + 1) = nodal
          end associate
       end do
       call stand_in(options, raw, model)
@@ -148,13 +153,12 @@ contains
    end subroutine check_diameter
 
    !> Rotation, damping and loads of a nodal diameter.
-   subroutine put_together(reader, options, raw, parts, nodal, error)
+   subroutine put_together(reader, options, raw, parts, nodal)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
       type(raw_model), intent(in) :: raw
       type(nodal_parts), intent(in) :: parts
-      type(nodal_matrices), intent(inout) :: nodal
-      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices), intent(out) :: nodal
 
       nodal%mass = hermitian(parts%mass)
       nodal%stiffness = hermitian(parts%stiffness)
@@ -181,7 +185,6 @@ contains
       end if
       call take_loads(reader, options, raw, parts, nodal)
       call join_bodies(options, raw, nodal)
-      if (options%modal_damping > 0.0_wp) call damp_modes(options%modal_damping, nodal, error)
    end subroutine put_together
 
    !> Bodies that no spring holds, among the displacements in front.

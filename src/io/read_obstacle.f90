@@ -66,9 +66,9 @@ contains
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(inout) :: contact
 
-      call reader%bind_word(key('sliding', 'how friction follows speed_1, speed_2: along the '// &
-                                'path that they add to the vibration, or against them whatever '// &
-                                'it is'), contact%sliding, sliding_words)
+      call reader%bind_word(key('sliding', &
+                                'friction along the path of speed and vibration, or against '// &
+                                'the speed alone'), contact%sliding, sliding_words)
    end subroutine keys_of_sliding
 
    !> What a model holds of the gaps in harmonics.

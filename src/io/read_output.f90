@@ -85,10 +85,9 @@ contains
       !> Which of them are names.
       logical, allocatable, intent(out) :: is_text(:)
 
-      call keys%bind_list(key('observe', 'which displacements are written; a dof number k is '// &
-                              'called uk, n_dof + k rowk', absent='all that the model file '// &
-                              'names, else every dof'), 'dof numbers or names of observed '// &
-                          'quantities', most, chosen, is_text)
+      call keys%bind_list(key('observe', 'dof number k is called uk, n_dof + k rowk', &
+                              absent='all that the model file names, else every dof'), &
+                          'dof numbers or names of observed quantities', most, chosen, is_text)
    end subroutine bind_observed
 
    !> What the model file observes, or every dof.
@@ -196,9 +195,10 @@ contains
       integer :: i
 
       call options%bind_keys(reader)
-      call reader%bind_list(key('observed', 'the quantity that has it, by the name that '// &
-                                'output%observe gives it', absent='the first one', &
-                                only='amplitude'), 'an observed quantity', 1, chosen, is_text)
+      call reader%bind_list(key('observed', &
+                                'the quantity that has it, by its name in output%observe', &
+                                absent='the first one', only='amplitude'), 'an observed quantity', &
+                            1, chosen, is_text)
       if (reader%failed()) return
       if (.not. options%is_wanted()) then
          ! The default of `of` stands in every case that is written out.

@@ -35,24 +35,21 @@ contains
       logical, allocatable :: is_text(:)
 
       call reader%open(group, 'derivatives of the response by parameters of the case')
-      call reader%bind_list(key('parameters', 'what the response is differentiated by: '// &
-                                "'contact%mu', 'load%harmonic_scale', ...", &
+      call reader%bind_list(key('parameters', 'what the response is differentiated by', &
                                 absent='none: no derivatives', &
                                 only="analysis = 'frf', 'point', 'resonance', 'mode'"), &
-                            'some of '//list_of(parameter_words), size(parameter_words), &
-                            words, is_text)
+                            'some of '//list_of(parameter_words), size(parameter_words), words, &
+                            is_text)
       call find_words(reader, 'parameters', words, parameter_words, options%parameters)
-      call reader%bind_list(key('quantities', 'what is differentiated: first_harmonic, '// &
-                                'largest, dissipation, wear_volume', &
-                                absent='all that the case has', only='parameters'), &
-                            'quantities', size(quantity_words), words, is_text)
+      call reader%bind_list(key('quantities', 'first_harmonic, largest, dissipation, wear_volume', &
+                                absent='all that the case has', only='parameters'), 'quantities', &
+                            size(quantity_words), words, is_text)
       call find_words(reader, 'quantities', words, quantity_words, options%quantities)
       ! One deviation for each parameter, or one for all.
       call reader%set_size('n_parameters', size(options%parameters))
-      call reader%bind(key('deviation', 'standard deviation of each parameter over its value, '// &
-                           'for that of the quantities', at_least(0.0_wp), &
-                           shape='n_parameters', absent='none', only='parameters'), &
-                       options%deviation)
+      call reader%bind(key('deviation', 'standard deviation of each parameter over its value', &
+                           at_least(0.0_wp), shape='n_parameters', absent='none', &
+                           only='parameters'), options%deviation)
       if (size(options%parameters) > 0 .or. reader%failed()) return
       if (size(options%quantities) > 0) call reader%refuse(group, 'quantities', &
          'is given without parameters: name them, or leave it out')

@@ -83,22 +83,23 @@ contains
                      self%n_terms)
       call keys%set_size('n_terms', self%n_terms)
       needed = self%n_terms > 0
-      call keys%bind(key('dof', 'supports, dofs that move alike; negative: the other way', &
+      call keys%bind(key('dof', 'supports that move alike; negative: the other way', &
                          dof_numbers(), shape=':', repeats=.false., &
                          absent='of the file, else direction'), given)
       if (allocated(given)) call move_alloc(given, self%dof)
-      call keys%bind(key('direction', 'motion of all dofs with the ground, in place of dof', &
-                         shape='n_dof', repeats=.false., absent='of the file'), self%direction)
+      call keys%bind(key('direction', 'motion of all dofs with the ground', shape='n_dof', &
+                         repeats=.false., absent='of the file'), self%direction)
       call keys%bind_word(key('motion', 'what the amplitudes are of'), self%motion, motion_words)
       call keys%bind(key('harmonic', '0 to n_harmonics', from_to(0, most_harmonic), &
                          shape='n_terms'), self%harmonic, default=1)
-      call keys%bind(key('amplitude', 'of each term, over the units of time to the first or '// &
-                         'second power for a velocity or an acceleration', unit='L', &
-                         shape='n_terms', absent='required with n_terms'), self%amplitude, needed)
+      call keys%bind(key('amplitude', &
+                         'over the time to the first or second power for a velocity or an '// &
+                         'acceleration', unit='L', shape='n_terms', &
+                         absent='required with n_terms'), self%amplitude, needed)
       call keys%bind(key('phase', 'of cos(n omega t + phase)', unit='degrees', &
                          shape='n_terms'), self%phase, default=0.0_wp)
-      call keys%bind_word(key('frame', 'what is observed: motion beside the base, or with it '// &
-                              '(supports alone)'), self%frame, frame_words)
+      call keys%bind_word(key('frame', 'motion beside the base, or with it (supports alone)'), &
+                          self%frame, frame_words)
    end subroutine bind_keys
 
    !> Whether dofs of the model are given a motion.

@@ -25,16 +25,17 @@ contains
       call keys%bind(key('n_sectors', 'equal sectors, of which the model is one', &
                          from_to(1, most_sectors), absent='of the file, else not cyclic'), &
                      cyclic%n_sectors, needs_sectors)
-      call keys%bind(key('engine_order', 'each sector moves as the one before it, this part of '// &
-                         'n_sectors periods later; negative: the other way', &
-                         from_to(-most_order, most_order), absent='required with sectors', &
-                         only="cyclic, all but analysis = 'modes'"), &
-                     cyclic%engine_order, needs_order)
-      call keys%bind(key('mistuned', 'solve for all sectors, whose pairs may differ: &contact '// &
-                         'takes values of n_pairs, all sectors alike, or of n_sectors times as '// &
-                         'many'), cyclic%is_mistuned)
-      call keys%bind(key('n_modes', 'natural frequencies of each nodal diameter', &
-                         from_to(1, most_dofs), only="analysis = 'modes'"), cyclic%n_modes)
+      call keys%bind(key('engine_order', &
+                         'each sector is this part of n_sectors periods behind the one before; '// &
+                         'negative: ahead', from_to(-most_order, most_order), &
+                         absent='required with sectors', &
+                         only="cyclic, all but analysis = 'modes'"), cyclic%engine_order, &
+                     needs_order)
+      call keys%bind(key('mistuned', &
+                         'solve all sectors; &contact takes n_pairs values, or n_sectors times '// &
+                         'as many'), cyclic%is_mistuned)
+      call keys%bind(key('n_modes', 'frequencies of each nodal diameter', from_to(1, most_dofs), &
+                         only="analysis = 'modes'"), cyclic%n_modes)
    end subroutine bind_sectors
 
    !> The interfaces of a sector; what a model file holds is there already.
@@ -45,16 +46,17 @@ contains
       !> The dofs are given nowhere else.
       logical, intent(in) :: needed
 
-      call keys%bind(key('n_interface', 'dofs of an interface; 0: only contact joins the sectors', &
+      call keys%bind(key('n_interface', &
+                         'dofs of an interface; 0: contact alone joins the sectors', &
                          from_to(0, most_dofs), absent='of the file'), n_interface)
       call keys%set_size('n_interface', n_interface)
       call keys%bind(key('left', 'dofs of the left interface', dof_numbers(), shape='n_interface', &
                          repeats=.false., absent='of the file'), cyclic%left, &
                      needed .and. n_interface > 0)
-      call keys%bind(key('right', 'the same of the right one, which moves as the left one of '// &
-                         'the next sector; negative: with its sign turned', dof_numbers(), &
-                         shape='n_interface', repeats=.false., absent='of the file'), &
-                     cyclic%right, needed .and. n_interface > 0)
+      call keys%bind(key('right', &
+                         'of the right one, which moves as the left one of the next sector; '// &
+                         'negative: turned', dof_numbers(), shape='n_interface', repeats=.false., &
+                         absent='of the file'), cyclic%right, needed .and. n_interface > 0)
    end subroutine bind_interfaces
 
 end module fw_cyclic_keys

@@ -44,28 +44,25 @@ contains
       logical, intent(in) :: by_order
       logical :: needed
 
-      call keys%bind(key('n_terms', 'loads on single dofs in any harmonic, added to the others', &
+      call keys%bind(key('n_terms', 'further loads on single dofs, in any harmonic', &
                          from_to(0, most_terms)), self%n_terms)
       call keys%set_size('n_terms', self%n_terms)
       needed = self%n_terms > 0
-      call keys%bind(key('term_dof', 'dof, or n_dof and a row; negative: with its sign '// &
-                         'turned', side_numbers(), shape='n_terms', &
-                         absent='required with n_terms'), self%dof, needed)
+      call keys%bind(key('term_dof', 'dof, or n_dof and a row; negative: turned', side_numbers(), &
+                         shape='n_terms', absent='required with n_terms'), self%dof, needed)
       call keys%bind(key('term_harmonic', 'harmonic, 0 to n_harmonics', &
                          from_to(0, most_harmonic), shape='n_terms', &
                          absent='1, or by term_order'), self%harmonic)
-      call keys%bind(key('term_order', 'engine orders in place of harmonics: the frequency of '// &
-                         'the sweep is their greatest common divisor times the speed', &
-                         from_to(1, most_harmonic), shape='n_terms', absent='term_harmonic'), &
-                     self%order, needed .and. by_order)
-      call keys%bind(key('term_amplitude', 'amplitude, over the frequency to term_power', &
-                         unit='F', shape='n_terms', absent='required with n_terms'), &
-                     self%amplitude, needed)
+      call keys%bind(key('term_order', &
+                         'in place of harmonics: the frequency is their greatest common '// &
+                         'divisor times the speed', from_to(1, most_harmonic), shape='n_terms', &
+                         absent='term_harmonic'), self%order, needed .and. by_order)
+      call keys%bind(key('term_amplitude', 'over the frequency to term_power', unit='F', &
+                         shape='n_terms', absent='required with n_terms'), self%amplitude, needed)
       call keys%bind(key('term_phase', 'of cos(n omega t + phase)', unit='degrees', &
                          shape='n_terms'), self%phase, default=0.0_wp)
-      call keys%bind(key('term_power', 'times the frequency of the term [rad/s] to this power; '// &
-                         '2: an unbalance', from_to(0, most_power), shape='n_terms'), &
-                     self%power, default=0)
+      call keys%bind(key('term_power', 'of the frequency of the term [rad/s]; 2: unbalance', &
+                         from_to(0, most_power), shape='n_terms'), self%power, default=0)
    end subroutine bind_keys
 
    !> Harmonics from orders, or 1 where neither is given.

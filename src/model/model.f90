@@ -1,6 +1,7 @@
 !> A linear structure: M u'' + C u' + K u = f_0 + f_c cos(omega t) + f_s sin(omega t), with the
 !> quantities that are observed of it. Read-only once built; may be shared between threads.
 module fw_model
+   use fw_closed_joint, only: closed_joint
    use fw_cyclic_data, only: cyclic_type
    use fw_kinds, only: wp
    use fw_load_waves, only: load_waves
@@ -41,6 +42,9 @@ module fw_model
       real(wp), allocatable :: rows(:, :)
       !> Sectors around an axis, of which the matrices are one.
       type(cyclic_type) :: cyclic
+      !> The closed joint with which modal damping takes its modes; not allocated where they are
+      !> those with open contact.
+      type(closed_joint), allocatable :: damped_joint
       !> Names of the units, 'length-mass-time-force', for labels; not allocated if not known.
       character(:), allocatable :: unit_system
       !> Hysteretic damping, i times this part of the stiffness in harmonics above 0; of sectors it

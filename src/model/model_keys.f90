@@ -8,12 +8,17 @@ module fw_model_keys
 
    public :: model_options
    public :: source_words, source_inline, source_hdf5, source_matrix_market, source_memory
+   public :: damping_of_stuck
    public :: bind_order, bind_matrices, bind_n_rows, bind_rows, bind_loads, bind_table
 
    character(*), parameter :: source_words(*) = &
       [character(13) :: 'inline', 'hdf5', 'matrix_market', 'memory']
    integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3, &
                          source_memory = 4
+
+   !> Of which modes the modal damping is.
+   character(*), parameter :: damping_words(*) = [character(5) :: 'open', 'stuck']
+   integer, parameter :: damping_of_open = 1, damping_of_stuck = 2
 
    !> More dofs are taken for a mistake: the matrices are dense.
    integer, parameter :: largest = 100000
@@ -29,6 +34,7 @@ module fw_model_keys
       real(wp) :: rayleigh_stiffness = 0.0_wp
       !> Fraction of critical damping of every mode.
       real(wp) :: modal_damping = 0.0_wp
+      integer :: modal_damping_of = damping_of_open
       !> Highest frequency of the modes that are damped so [Hz] (0: all are).
       real(wp) :: modal_damping_up_to = 0.0_wp
       !> [rad/s]
@@ -55,8 +61,9 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('model', 'mass, stiffness and damping, inline or from a file')
-      call keys%bind_word(key('source', "where the matrices are; 'memory': in the program that "// &
-                              'calls the library'), self%source, source_words)
+      call keys%bind_word(key('source', &
+                              "where the matrices are; 'memory': in the calling program"), &
+                          self%source, source_words)
    end subroutine bind_source
 
    subroutine bind_file(self, keys)
@@ -66,9 +73,9 @@ contains
       call keys%bind(key('file', 'model file, relative to the namelist', &
                          absent='required unless inline'), self%file, &
                      needed=any(self%source == [source_hdf5, source_matrix_market]))
-      call keys%bind(key('unit_system', "units of length, mass, time and force, such as "// &
-                         "'mm-tonne-s-N': for values with units, and in results", &
-                         absent='of the file'), self%unit_system)
+      call keys%bind(key('unit_system', &
+                         "length, mass, time, force, as 'mm-tonne-s-N': of values with "// &
+                         ""// 'units, and results', absent='of the file'), self%unit_system)
    end subroutine bind_file
 
    subroutine bind_order(keys, n_dof, is_inline)
@@ -76,8 +83,8 @@ contains
       integer, intent(inout) :: n_dof
       logical, intent(in) :: is_inline
 
-      call keys%bind(key('n_dof', 'order of the matrices; with a file it may be left out', &
-                         from_to(1, largest), absent='required inline'), n_dof, needed=is_inline)
+      call keys%bind(key('n_dof', 'order of the matrices', from_to(1, largest), &
+                         absent='required inline'), n_dof, needed=is_inline)
       ! Shapes of later keys name it.
       call keys%set_size('n_dof', n_dof)
    end subroutine bind_order
@@ -95,22 +102,23 @@ contains
 
       call keys%bind(key('mass', 'symmetric, no negative diagonal; may be singular', unit='M', &
                          shape=shape, repeats=.false., absent='required inline'), mass, is_inline)
-      call keys%bind(key('stiffness', 'symmetric; may be singular where contact holds the '// &
-                         'structure', unit='F/L', shape=shape, repeats=.false., &
-                         absent='required inline'), stiffness, is_inline)
-      call keys%bind(key('damping', 'symmetric; the next three add to it', unit='F s/L', &
-                         shape=shape, repeats=.false., absent='0'), damping)
-      call keys%bind(key('structural_damping', 'hysteretic, symmetric: i times it is added to '// &
-                         'the stiffness in harmonics above 0', unit='F/L', shape=shape, &
-                         repeats=.false., absent='0'), structural)
-      call keys%bind(key('circulatory', 'stiffness for each rad/s of rotation_speed, of any '// &
-                         'shape: (i, j) is the force on dof i by dof j, column after column', &
-                         unit='F s/L', shape=shape, repeats=.false., absent='0'), circulatory)
-      call keys%bind(key('stiffness_unsymmetric', 'added to the stiffness as it is, of '// &
-                         'bearings for one', unit='F/L', shape=shape, repeats=.false., &
-                         absent='0'), stiffness_unsymmetric)
-      call keys%bind(key('damping_unsymmetric', 'added to the damping as it is', unit='F s/L', &
-                         shape=shape, repeats=.false., absent='0'), damping_unsymmetric)
+      call keys%bind(key('stiffness', 'symmetric; may be singular where contact holds', &
+                         unit='F/L', shape=shape, repeats=.false., absent='required inline'), &
+                     stiffness, is_inline)
+      call keys%bind(key('damping', 'symmetric', unit='F s/L', shape=shape, repeats=.false., &
+                         absent='0'), damping)
+      call keys%bind(key('structural_damping', &
+                         'hysteretic, symmetric: i times it in harmonics above 0', unit='F/L', &
+                         shape=shape, repeats=.false., absent='0'), structural)
+      call keys%bind(key('circulatory', &
+                         'stiffness for each rad/s of rotation_speed: (i, j) is the force on '// &
+                         'dof i by dof j', unit='F s/L', shape=shape, repeats=.false., &
+                         absent='0'), circulatory)
+      call keys%bind(key('stiffness_unsymmetric', 'added to the stiffness, as of bearings', &
+                         unit='F/L', shape=shape, repeats=.false., absent='0'), &
+                     stiffness_unsymmetric)
+      call keys%bind(key('damping_unsymmetric', 'added to the damping', unit='F s/L', shape=shape, &
+                         repeats=.false., absent='0'), damping_unsymmetric)
    end subroutine bind_matrices
 
    !> Displacements that are combinations of dofs: how many.
@@ -120,9 +128,9 @@ contains
       !> Of the model file on entry.
       integer, intent(inout) :: n_rows
 
-      call keys%bind(key('n_rows', 'displacements that are combinations of dofs: sides, '// &
-                         'term_dof and observe name them by n_dof + 1, ..', from_to(0, largest), &
-                         absent='of the file'), n_rows)
+      call keys%bind(key('n_rows', &
+                         'displacements that combine dofs, named n_dof + 1, .. in sides, '// &
+                         'term_dof, observe', from_to(0, largest), absent='of the file'), n_rows)
       call keys%set_size('n_rows', n_rows)
       call keys%set_size('(n_dof+n_rows)', n_dof + n_rows)
    end subroutine bind_n_rows
@@ -133,7 +141,7 @@ contains
       logical, intent(in) :: needed
       real(wp), allocatable, intent(inout) :: rows(:, :)
 
-      call keys%bind(key('row', 'weight of each dof in each of them, row after row', &
+      call keys%bind(key('row', 'weights of the dofs in each, row after row', &
                          shape='n_dof x n_rows', repeats=.false., &
                          absent='of the file, else required with n_rows'), rows, needed)
    end subroutine bind_rows
@@ -147,18 +155,22 @@ contains
                          unit='1/s'), self%rayleigh_mass)
       call keys%bind(key('rayleigh_stiffness', 'adds this times K, with rotation, to the '// &
                          'damping', at_least(0.0_wp), unit='s'), self%rayleigh_stiffness)
-      call keys%bind(key('modal_damping', 'fraction of critical damping of every mode with '// &
-                         'open contact', at_least(0.0_wp)), self%modal_damping)
-      call keys%bind(key('modal_damping_up_to', 'of modes up to this frequency alone, which '// &
-                         'takes less time; 0: of all', at_least(0.0_wp), unit='Hz', &
-                         only='modal_damping'), self%modal_damping_up_to)
-      call keys%bind(key('rotation_speed', 'adds its square times stiffness_rotation and '// &
-                         'load/static_rotation of the model file, and its multiple of '// &
-                         'coriolis and circulatory', at_least(0.0_wp), &
+      call keys%bind(key('modal_damping', 'fraction of critical damping of all modes', &
+                         at_least(0.0_wp)), self%modal_damping)
+      call keys%bind_word(key('modal_damping_of', "modes with open contact, or with all pairs "// &
+                              "stuck: `closed` of analysis 'modes'", only='modal_damping'), &
+                          self%modal_damping_of, damping_words)
+      call keys%bind(key('modal_damping_up_to', &
+                         'of modes up to this frequency alone, which is faster; 0: of all', &
+                         at_least(0.0_wp), unit='Hz', only='modal_damping'), &
+                     self%modal_damping_up_to)
+      call keys%bind(key('rotation_speed', &
+                         'its square times stiffness_rotation and load/static_rotation of the '// &
+                         'file, itself times coriolis and circulatory', at_least(0.0_wp), &
                          unit='rad/s'), self%rotation_speed)
-      call keys%bind(key('loss_factor', 'adds i times this part of the stiffness, with '// &
-                         'rotation, in harmonics above 0: hysteretic damping', &
-                         at_least(0.0_wp)), self%loss_factor)
+      call keys%bind(key('loss_factor', &
+                         'i times this part of the stiffness, with rotation, in harmonics '// &
+                         'above 0', at_least(0.0_wp)), self%loss_factor)
    end subroutine bind_additions
 
    !> Group &load, begun here; what a model file holds stays where nothing is given.
@@ -169,9 +181,8 @@ contains
 
       call keys%open('load', 'static and harmonic loads')
       call keys%bind(load_key('static', 'constant load'), static, default=0.0_wp)
-      call keys%bind(load_key('cosine', 'cosine part of the first harmonic'), cosine, &
-                     default=0.0_wp)
-      call keys%bind(load_key('sine', 'sine part of the first harmonic'), sine, default=0.0_wp)
+      call keys%bind(load_key('cosine', 'cosine part of harmonic 1'), cosine, default=0.0_wp)
+      call keys%bind(load_key('sine', 'sine part of harmonic 1'), sine, default=0.0_wp)
 
    contains
 
@@ -192,17 +203,17 @@ contains
       real(wp), allocatable, intent(inout) :: frequency(:), scale(:)
       logical :: needed
 
-      call keys%bind(key('n_table', 'points of a table by which all vibratory loads are '// &
-                         'multiplied; 0 switches that of a file off', from_to(0, largest), &
-                         absent='of the file'), n_table)
+      call keys%bind(key('n_table', &
+                         'points that multiply all vibratory loads; 0 switches those of a file '// &
+                         'off', from_to(0, largest), absent='of the file'), n_table)
       call keys%set_size('n_table', n_table)
       needed = n_table > 0
-      call keys%bind(key('table_frequency', 'where the table has points, whatever '// &
-                         'sweep%unit, rising; linear between them, refused beyond', &
+      call keys%bind(key('table_frequency', &
+                         'of the points, rising; linear between, refused beyond', &
                          at_least(0.0_wp), unit='rad/s', shape='n_table', &
-                         absent='of the file, else required with n_table'), &
-                     frequency, needed .and. .not. allocated(frequency))
-      call keys%bind(key('table_scale', 'factor of the loads there', shape='n_table', &
+                         absent='of the file, else required with n_table'), frequency, &
+                     needed .and. .not. allocated(frequency))
+      call keys%bind(key('table_scale', 'factor of the loads', shape='n_table', &
                          absent='of the file, else required with n_table'), scale, &
                      needed .and. .not. allocated(scale))
    end subroutine bind_table
@@ -212,9 +223,9 @@ contains
       class(model_options), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
 
-      call keys%bind(key('static_scale', 'multiplies the static load, that of rotation '// &
-                         'included'), self%static_scale)
-      call keys%bind(key('harmonic_scale', 'multiplies all vibratory loads'), self%harmonic_scale)
+      call keys%bind(key('static_scale', 'of the static load and that of rotation'), &
+                     self%static_scale)
+      call keys%bind(key('harmonic_scale', 'of all vibratory loads'), self%harmonic_scale)
    end subroutine bind_scales
 
 end module fw_model_keys

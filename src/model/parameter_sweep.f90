@@ -42,8 +42,8 @@ contains
       integer :: choice
 
       choice = self%number + 1
-      call keys%bind_word(key('parameter', 'what the sweep goes over: start, end and values '// &
-                              'are of it', only="analysis = 'frf'"), choice, words)
+      call keys%bind_word(key('parameter', 'what start, end and values are of', &
+                              only="analysis = 'frf'"), choice, words)
       self%number = choice - 1
    end subroutine bind_parameter
 
@@ -52,14 +52,13 @@ contains
       class(parameter_sweep), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
 
-      call keys%bind(key('values', 'a list of values in any order, in place of start, end and '// &
-                         'n_points', shape=':', repeats=.false., absent='none', &
+      call keys%bind(key('values', 'in any order, in place of start, end, n_points', shape=':', &
+                         repeats=.false., absent='none', &
                          only="analysis = 'frf', 'time', continuation = 'natural'"), self%values)
-      call keys%bind(key('frequency', 'the one frequency of a sweep over another parameter', &
-                         above(0.0_wp), unit='unit', &
-                         absent='required with another parameter'), self%frequency, &
+      call keys%bind(key('frequency', 'of a sweep over another parameter', above(0.0_wp), &
+                         unit='unit', absent='required with another parameter'), self%frequency, &
                      needed=self%is_wanted())
-      call keys%bind_word(key('as', 'values of the parameter, or factors of those of the case', &
+      call keys%bind_word(key('as', 'values, or factors of those of the case', &
                               only="parameter other than 'frequency'"), self%as, as_words)
    end subroutine bind_values
 

@@ -6,17 +6,20 @@
 !> T being the identity but for the right interface, which is no coordinate any more. Where the
 !> model holds matrices of nodal diameters, T is the identity of the physical coordinates.
 module fw_sector
+   use fw_closed_joint, only: closed_joint
    use fw_cyclic_data, only: nodal_matrices, nodal_speed
-   use fw_damping, only: add_modal_damping
    use fw_error, only: error_type
+   use fw_held_damping, only: add_held_damping
    use fw_hermitian, only: complex_part, real_form
    use fw_kinds, only: wp
    use fw_model, only: model_type
+   use fw_sector_relative, only: held_basis, new_sector_relative, sector_relative
    use fw_side, only: terms_of
    implicit none (type, external)
    private
 
-   public :: sector_at, speed_at, sector_rows, damp_modes, add_sector_spring
+   public :: sector_at, speed_at, sector_rows, damp_modes, add_sector_spring, close_sector
+   public :: damp_structure
 
 contains
 
@@ -52,7 +55,7 @@ contains
          call nodal%add_structural(tied(model%cyclic%structural, place, turn, n))
       end if
       if (model%cyclic%modal_damping > 0.0_wp) then
-         call damp_modes(model%cyclic%modal_damping, nodal, error)
+         call damp_modes(model, k, model%cyclic%modal_damping, nodal, error)
       end if
    end subroutine sector_at
 
@@ -189,18 +192,52 @@ contains
       end do
    end subroutine tie_vectors
 
+   !> Modal damping of a structure that is no sector, added to a matrix.
+   subroutine damp_structure(model, stiffness, ratio, damping, error, up_to)
+      !> With its mass, and the joint that its modes are those of.
+      type(model_type), intent(in) :: model
+      !> Symmetric (n_dof, n_dof).
+      real(wp), contiguous, intent(in) :: stiffness(:, :)
+      real(wp), intent(in) :: ratio
+      real(wp), intent(inout) :: damping(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      !> Circular frequency above which no mode is damped [rad/s]; 0: all are.
+      real(wp), intent(in) :: up_to
+      complex(wp), allocatable :: closed(:, :), basis(:, :)
+      real(wp), allocatable :: free(:, :)
+
+      if (.not. allocated(model%damped_joint)) then
+         call add_held_damping(model%mass, stiffness, ratio, damping, error, up_to)
+         return
+      end if
+      closed = cmplx(stiffness, 0.0_wp, wp)
+      call close_sector(model, model%damped_joint, 0, closed, basis)
+      ! Not allocated: all rows are springs.
+      if (allocated(basis)) free = real(basis, wp)
+      call add_held_damping(model%mass, real(closed, wp), ratio, damping, error, up_to, free)
+   end subroutine damp_structure
+
    !> Modal damping of Hermitian modes: those of the real form, in which each stands twice.
-   subroutine damp_modes(ratio, nodal, error)
+   subroutine damp_modes(model, k, ratio, nodal, error)
+      !> Whose nodal diameter this is, with the joint that the modes are those of.
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
       real(wp), intent(in) :: ratio
       type(nodal_matrices), intent(inout) :: nodal
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: damping(:, :)
+      complex(wp), allocatable :: stiffness(:, :), basis(:, :)
+      real(wp), allocatable :: damping(:, :), free(:, :)
       integer :: n
 
       n = size(nodal%mass, 1)
       allocate (damping(2*n, 2*n), source=0.0_wp)
-      call add_modal_damping(real_form(nodal%mass), real_form(nodal%stiffness), ratio, damping, &
-                             error)
+      stiffness = nodal%stiffness
+      if (allocated(model%damped_joint)) then
+         call close_sector(model, model%damped_joint, k, stiffness, basis)
+         if (allocated(basis)) free = real_form(basis)
+      end if
+      call add_held_damping(real_form(nodal%mass), real_form(stiffness), ratio, damping, error, &
+                            basis=free)
       if (allocated(error)) return
       if (allocated(nodal%damping)) then
          nodal%damping = nodal%damping + complex_part(damping)
@@ -258,6 +295,32 @@ contains
          end associate
       end do
    end subroutine add_side
+
+   !> A joint closed in nodal diameter k: its springs join the stiffness; where rows are held, there
+   !> is a basis of the motions that leave them alone.
+   subroutine close_sector(model, joint, k, stiffness, basis)
+      type(model_type), intent(in) :: model
+      type(closed_joint), intent(in) :: joint
+      integer, intent(in) :: k
+      !> Hermitian (n, n).
+      complex(wp), intent(inout) :: stiffness(:, :)
+      !> (n, n - n_held), not allocated where nothing is held.
+      complex(wp), allocatable, intent(out) :: basis(:, :)
+      type(sector_relative) :: relative
+      complex(wp), allocatable :: rows(:, :)
+      integer :: i
+
+      if (joint%n_rows() == 0) return
+      call sector_rows(model, k, joint%side_1, joint%side_2, joint%sector_2, rows)
+      do i = 1, joint%n_rows()
+         if (.not. joint%is_held(i)) call add_sector_spring(rows(i, :), joint%stiffness(i), &
+                                                            stiffness)
+      end do
+      if (.not. any(joint%is_held)) return
+      rows = rows(pack([(i, i=1, joint%n_rows())], joint%is_held), :)
+      call new_sector_relative(rows, relative)
+      call held_basis(relative, size(stiffness, 1), basis)
+   end subroutine close_sector
 
    !> stiffness + row^H coefficient row; the row holds the first coordinates.
    pure subroutine add_sector_spring(row, coefficient, stiffness)

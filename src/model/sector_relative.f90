@@ -6,7 +6,7 @@ module fw_sector_relative
    implicit none (type, external)
    private
 
-   public :: sector_relative, new_sector_relative
+   public :: sector_relative, new_sector_relative, held_basis
 
    type :: sector_relative
       !> Rows that are coordinates, in their order (n_coordinates).
@@ -106,5 +106,24 @@ contains
       self%free = pack([(i, i=1, size(is_free))], is_free)
       self%r = echelon(:m, self%free)
    end subroutine finish
+
+   !> Motions in which no held row moves.
+   pure subroutine held_basis(relative, n, basis)
+      type(sector_relative), intent(in) :: relative
+      integer, intent(in) :: n
+      complex(wp), allocatable, intent(out) :: basis(:, :)
+      integer :: j, n_free, n_rows
+
+      n_free = size(relative%free)
+      n_rows = n_free + size(relative%pivot)
+      allocate (basis(n, n - size(relative%pivot)), source=(0.0_wp, 0.0_wp))
+      basis(relative%pivot, :n_free) = -relative%r
+      do j = 1, n_free
+         basis(relative%free(j), j) = (1.0_wp, 0.0_wp)
+      end do
+      do j = 1, n - n_rows
+         basis(n_rows + j, n_free + j) = (1.0_wp, 0.0_wp)
+      end do
+   end subroutine held_basis
 
 end module fw_sector_relative

@@ -122,30 +122,26 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('solver', 'nonlinear solver, tolerance')
-      call keys%bind_word(key('kind', "Newton's method with a line search, MINPACK's hybrid "// &
-                              'method, KINSOL of SUNDIALS, or pseudo-time'), &
-                          self%kind, solver_words)
-      call keys%bind_word(key('linear', 'how linear problems are solved; auto: by their size', &
+      call keys%bind_word(key('kind', &
+                              "Newton with line search, MINPACK's hybrid method, KINSOL, "// &
+                              "pseudo-time"), self%kind, solver_words)
+      call keys%bind_word(key('linear', 'of Newton steps; ''auto'': by the size', &
                               only="kind = 'newton', 'pseudo_time'"), self%linear, linear_words)
-      call keys%bind(key('tolerance', 'on the norm of the residual over that of the vibratory '// &
-                         'load', above(0.0_wp) .and. below(1.0_wp)), self%tolerance)
-      call keys%bind(key('max_iterations', 'steps from each guess', at_least(1)), &
-                     self%max_iterations)
-      call keys%bind(key('max_seconds', 'time after which a point counts as not converged; 0: '// &
-                         'none; along a branch that of the first point', at_least(0.0_wp), &
-                         unit='s'), self%max_seconds)
+      call keys%bind(key('tolerance', 'norm of the residual over that of the vibratory load', &
+                         above(0.0_wp) .and. below(1.0_wp)), self%tolerance)
+      call keys%bind(key('max_iterations', 'from each guess', at_least(1)), self%max_iterations)
+      call keys%bind(key('max_seconds', &
+                         'of a point, which then is not converged; 0: no limit; of a branch: '// &
+                         'of its first point', at_least(0.0_wp), unit='s'), self%max_seconds)
       call keys%bind(key('fallback', 'try other ways where the first guess fails'), self%fallback)
-      call keys%bind(key('skips', 'leave out stuck pairs and components that nothing moves'), &
-                     self%skips)
-      call keys%bind(key('n_solutions', 'solutions of the point at most, which become rows by '// &
-                         'rising amplitude; above 1 further ones are searched for by deflation', &
+      call keys%bind(key('skips', 'leave out stuck pairs and what nothing moves'), self%skips)
+      call keys%bind(key('n_solutions', &
+                         'at most, rows by rising amplitude; above 1 searched for by deflation', &
                          from_to(1, most_solutions), only="analysis = 'point'"), self%n_solutions)
-      call keys%bind(key('deflation_power', 'power of the distance by which known solutions '// &
-                         'repel', from_to(1.0_wp, most_power), only='n_solutions > 1'), &
-                     self%deflation_power)
-      call keys%bind(key('deflation_shift', 'of the factor that repels, far from all known '// &
-                         'solutions', from_to(0.0_wp, most_shift), only='n_solutions > 1'), &
-                     self%deflation_shift)
+      call keys%bind(key('deflation_power', 'of the distance by which known solutions repel', &
+                         from_to(1.0_wp, most_power), only='n_solutions > 1'), self%deflation_power)
+      call keys%bind(key('deflation_shift', 'of the factor that repels, far away', &
+                         from_to(0.0_wp, most_shift), only='n_solutions > 1'), self%deflation_shift)
    end subroutine bind_solver_keys
 
    !> The keys of group &pseudo_time.
@@ -154,12 +150,13 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('pseudo_time', 'pseudo-time integration')
-      call keys%bind_word(key('flow', 'P of P dU/dt* = -R(U): 2 i n omega M, the identity, or '// &
-                              'the linear joint with every pair closed'), self%flow, flow_words)
-      call keys%bind_word(key('scheme', "steps by Newton's method, CVODE (wear: IDA), linearly "// &
-                              'implicit, or explicit'), self%scheme, scheme_words)
-      call keys%bind(key('step', 'first step; 0: chosen by the scheme', at_least(0.0_wp)), &
-                     self%step)
+      call keys%bind_word(key('flow', &
+                              'P of P dU/dt* = -R(U): 2 i n omega M, identity, the linear '// &
+                              'joint with closed pairs'), self%flow, flow_words)
+      call keys%bind_word(key('scheme', &
+                              'by Newton, CVODE (wear: IDA), linearly implicit, explicit'), &
+                          self%scheme, scheme_words)
+      call keys%bind(key('step', 'the first; 0: chosen', at_least(0.0_wp)), self%step)
       call keys%bind(key('cfl', 'Courant number', above(0.0_wp), only="scheme = 'runge_kutta'"), &
                      self%cfl)
       call keys%bind(key('max_steps', 'steps taken and refused', at_least(1)), self%max_steps)
@@ -193,30 +190,27 @@ contains
             last = range_type()
          end if
       end if
-      call keys%bind(key('start', 'first frequency, or the only one', first, &
-                         unit='unit', absent='required'), self%start, &
-                     needed=needs)
-      call keys%bind(key('end', 'last frequency; below start the sweep goes down', &
-                         last, unit='unit', absent='required for frf'), self%end, &
-                     needed=is_range)
-      call keys%bind_word(key('unit', 'of frequencies, start and end; results are in rad/s'), &
-                          self%unit, unit_words)
-      call keys%bind_word(key('continuation', 'points at given frequencies, or a branch '// &
-                              'through folds'), self%continuation, continuation_words)
-      call keys%bind(key('n_points', 'points, evenly spaced, both ends included; of a branch: '// &
-                         'sets the first step', from_to(1, most_points), &
-                         absent='required for a natural frf'), self%n_points, &
-                     needed=is_range .and. self%continuation == continuation_natural)
-      call keys%bind(key('max_points', 'points of a branch at most', at_least(1), &
+      call keys%bind(key('start', 'the first, or the only one', first, unit='unit', &
+                         absent='required'), self%start, needed=needs)
+      call keys%bind(key('end', 'the last; below start the sweep goes down', last, unit='unit', &
+                         absent='required for frf'), self%end, needed=is_range)
+      call keys%bind_word(key('unit', 'of frequencies given; results are in rad/s'), self%unit, &
+                          unit_words)
+      call keys%bind_word(key('continuation', 'given frequencies, or a branch through folds'), &
+                          self%continuation, continuation_words)
+      call keys%bind(key('n_points', 'evenly spaced, with both ends; of a branch: its first step', &
+                         from_to(1, most_points), absent='required for a natural frf'), &
+                     self%n_points, needed=is_range .and. self%continuation == continuation_natural)
+      call keys%bind(key('max_points', 'of a branch', at_least(1), &
                          only="continuation = 'arclength'"), self%max_points)
-      call keys%bind(key('stability', 'compute the Floquet multipliers of every point', &
+      call keys%bind(key('stability', 'Floquet multipliers of every point', &
                          only="springs, law = 'penalty', 'regularised'"), self%stability)
-      call keys%bind(key('speed_order', 'the rotation speed is the frequency over this: 1 for '// &
-                         'unbalance, an engine order of the loads; 0: it does not follow', &
-                         at_least(0.0_wp), only="analysis = 'frf', 'point', 'population', "// &
-                              "'resonance'"), &
+      call keys%bind(key('speed_order', &
+                         'rotation speed is the frequency over this: 1 for unbalance, an '// &
+                         'engine order; 0: it does not follow', at_least(0.0_wp), &
+                         only="analysis = 'frf', 'point', 'population', 'resonance'"), &
                      self%speed_order)
-      call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
+      call keys%bind(key('refine', 'points solved to find maxima become rows', &
                          only="analysis = 'frf', continuation = 'natural'"), self%refine)
    end subroutine bind_sweep_keys
 

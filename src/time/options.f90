@@ -24,9 +24,10 @@ contains
       class(key_visitor), intent(inout) :: keys
 
       call keys%open('time', 'time integration')
-      call keys%bind(key('n_periods', 'periods integrated at most', at_least(1)), self%n_periods)
-      call keys%bind(key('steps_per_period', 'steps, at least max(16, 4H); also the instants '// &
-                         'of histories', at_least(2)), self%steps_per_period)
+      call keys%bind(key('n_periods', 'at most', at_least(1)), self%n_periods)
+      call keys%bind(key('steps_per_period', &
+                         'at least max(16, 4H); also the instants of histories', at_least(2)), &
+                     self%steps_per_period)
    end subroutine bind_keys
 
 end module fw_time_options

@@ -31,15 +31,15 @@ contains
       logical, intent(in) :: is_wanted
 
       call keys%open('ringdown', 'free decay from the shape of a mode')
-      call keys%bind(key('number', 'of the elastic modes of the structure with its closed '// &
-                         'pairs stuck', at_least(1)), self%number)
-      call keys%bind(key('amplitude', 'of the first observed quantity, from where it rests '// &
-                         'without vibration', above(0.0_wp), unit='L', absent='required', &
+      call keys%bind(key('number', 'of the elastic modes with closed pairs stuck', at_least(1)), &
+                     self%number)
+      call keys%bind(key('amplitude', 'of the first observed quantity, from its rest', &
+                         above(0.0_wp), unit='L', absent='required', &
                          only="analysis = 'ringdown'"), self%amplitude, needed=is_wanted)
-      call keys%bind(key('n_cycles', 'periods of the stuck mode that are followed', &
-                         from_to(1, 100000)), self%n_cycles)
-      call keys%bind(key('steps_per_period', 'steps of such a period; changes of stick and '// &
-                         'slip are located within', from_to(16, 100000)), self%steps_per_period)
+      call keys%bind(key('n_cycles', 'periods of the stuck mode', from_to(1, 100000)), &
+                     self%n_cycles)
+      call keys%bind(key('steps_per_period', 'changes of stick and slip are located within', &
+                         from_to(16, 100000)), self%steps_per_period)
    end subroutine bind_keys
 
 end module fw_ringdown_options

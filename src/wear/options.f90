@@ -79,40 +79,39 @@ contains
       real(wp), parameter :: most_cycles = 1.0e300_wp
 
       call keys%open('wear', 'fretting wear')
-      call keys%bind_word(key('scheme', 'depth by the rate at the start of a step, vibration '// &
-                              'and depth together, or linearly implicit'), &
-                          self%scheme, wear_scheme_words)
-      call keys%bind_word(key('law', 'depth by pressure times slip, or by friction energy'), &
-                          self%law, wear_law_words)
-      call keys%bind(key('order', 'of the implicit scheme 1 to 4, of the explicit one 1 or 2; '// &
-                         '0: chosen', from_to(0, 4), only="scheme = 'implicit', 'explicit'"), &
-                     self%order)
-      call keys%bind(key('coefficient', 'k_w: depth is k_w times contact force times slip over '// &
-                         'area', above(0.0_wp), 'L^2/F', 'n_pairs', &
-                         absent='required for wear'), self%coefficient, needed=is_wear)
-      call keys%bind(key('n_cycles', 'cycles to be covered', above(0.0_wp) .and. &
-                         at_most(most_cycles), absent='none'), self%n_cycles)
-      call keys%bind(key('max_depth_step', 'largest growth of the depth in a step; 0: by the '// &
-                         'error alone', at_least(0.0_wp), unit='L'), self%max_depth_step)
-      call keys%bind(key('error_tolerance', 'largest estimated error of a step over the '// &
-                         'largest depth; 0: by max_depth_step, else 1e-3', at_least(0.0_wp)), &
-                     self%error_tolerance)
-      call keys%bind(key('steady_tolerance', 'a joint is steady when its largest rate has '// &
-                         'fallen to this part of the largest so far', above(0.0_wp) .and. &
-                         below(1.0_wp)), self%steady_tolerance)
+      call keys%bind_word(key('scheme', &
+                              'rate at the start of a step, vibration and depth together, '// &
+                              'linearly implicit'), self%scheme, wear_scheme_words)
+      call keys%bind_word(key('law', 'pressure times slip, or friction energy'), self%law, &
+                          wear_law_words)
+      call keys%bind(key('order', 'implicit 1 to 4, explicit 1 or 2; 0: chosen', from_to(0, 4), &
+                         only="scheme = 'implicit', 'explicit'"), self%order)
+      call keys%bind(key('coefficient', 'depth over contact force times slip over area', &
+                         above(0.0_wp), 'L^2/F', 'n_pairs', absent='required for wear'), &
+                     self%coefficient, needed=is_wear)
+      call keys%bind(key('n_cycles', 'to be covered', above(0.0_wp) .and. at_most(most_cycles), &
+                         absent='none'), self%n_cycles)
+      call keys%bind(key('max_depth_step', 'growth of the depth in a step; 0: by the error alone', &
+                         at_least(0.0_wp), unit='L'), self%max_depth_step)
+      call keys%bind(key('error_tolerance', &
+                         'of a step over the largest depth; 0: by max_depth_step, else 1e-3', &
+                         at_least(0.0_wp)), self%error_tolerance)
+      call keys%bind(key('steady_tolerance', &
+                         'steady where the largest rate has fallen to this part of its maximum', &
+                         above(0.0_wp) .and. below(1.0_wp)), self%steady_tolerance)
       call keys%bind(key('max_steps', 'steps at most', at_least(1)), self%max_steps)
-      call keys%bind(key('check_steps', 'run once more with halved steps, to see how far the '// &
-                         'profile moves'), self%check_steps)
-      call keys%bind_word(key('mu_by', 'whether friction changes with the depth, or with the '// &
-                              'friction energy of its pair'), self%mu_by, mu_by_words)
-      call keys%bind(key('mu_final', 'friction coefficient that wear leads to', at_least(0.0_wp), &
-                         shape='n_pairs', absent='required with mu_by', only='mu_by'), &
-                     self%mu_final, needed=self%mu_by /= mu_by_none)
-      call keys%bind(key('mu_scale', 'depth or energy after which 1/e of the change is left', &
-                         above(0.0_wp), 'L or F L', 'n_pairs', absent='required with mu_by', &
-                         only='mu_by'), self%mu_scale, needed=self%mu_by /= mu_by_none)
-      call keys%bind(key('follow_resonance', 'keep the frequency at the peak of the first '// &
-                         'observed quantity'), self%follow_resonance)
+      call keys%bind(key('check_steps', 'run again with halved steps'), self%check_steps)
+      call keys%bind_word(key('mu_by', &
+                              'friction changes with the depth, or the friction energy of its '// &
+                              'pair'), self%mu_by, mu_by_words)
+      call keys%bind(key('mu_final', 'that wear leads to', at_least(0.0_wp), shape='n_pairs', &
+                         absent='required with mu_by', only='mu_by'), self%mu_final, &
+                     needed=self%mu_by /= mu_by_none)
+      call keys%bind(key('mu_scale', 'after which 1/e of the change is left', above(0.0_wp), &
+                         'L or F L', 'n_pairs', absent='required with mu_by', only='mu_by'), &
+                     self%mu_scale, needed=self%mu_by /= mu_by_none)
+      call keys%bind(key('follow_resonance', 'stay at the peak of the first observed quantity'), &
+                     self%follow_resonance)
    end subroutine bind_keys
 
    !> Whether the error sets the steps, not the growth of the depth alone.

@@ -114,24 +114,34 @@ def judged(case, u, values, ends, seed, found):
     if own is None or abs(amplitude(own) / centre - 1.0) > WITHIN:
         found["centre"] = 1
         return
-    for end, value in zip(ends, (low, high)):
-        there = judge.walk(omega, middle, own, end)
-        found["ends"] += there is None or abs(amplitude(there) / value - 1.0) > WITHIN
     random = np.random.default_rng(1000 + seed)
     shares = [*random.uniform(-1.0, 1.0, (SHARES, pairs)),
               *map(np.array, itertools.product((-1.0, 1.0), repeat=pairs))]
+    reached = [(middle, own)]
     for share in shares:
         there = judge.walk(omega, middle, own, share)
         if there is not None and off(amplitude(there), low, high) > WITHIN:
-            there = own
-            for k in range(32):
-                there = None if there is None else judge.solve(omega, (k + 1) / 32 * share, there)
+            there = judge.follow(omega, own, share)
         if there is None:
             found["lost"] += 1
-        elif off(amplitude(there), low, high) > WITHIN:
+            continue
+        reached.append((share, there))
+        if off(amplitude(there), low, high) > WITHIN:
             found["outside"] += 1
             found["notes"].append(f"{amplitude(there):.9e} outside of {low:.9e} {high:.9e}: "
                                   f"{np.round(share, 3).tolist()}")
+    for end, value in zip(ends, (low, high)):
+        found["ends"] += not is_answer(judge, omega, reached, end, value)
+
+
+def is_answer(judge, omega, reached, end, value):
+    """Whether the straight way from the middle, or a solution nearby, leads to a value at an end."""
+    nearest = sorted(reached, key=lambda known: np.abs(known[0] - end).max())
+    middle, own = reached[0]
+    ways = (lambda: judge.follow(omega, own, end), lambda: judge.walk(omega, middle, own, end),
+            *(lambda u=u: judge.solve(omega, end, u) for _, u in nearest[:40]))
+    return any(there is not None and abs(amplitude(there) / value - 1.0) <= WITHIN
+               for there in (way() for way in ways))
 
 
 def amplitude(u):

@@ -10,7 +10,7 @@ A body of three dofs carries one to four tips, each on springs of a direction of
 obstacles: gaps with one to three terms in harmonics 0 to 4, sides that slide along one or two
 directions or not at all, on the path or steadily. Tips have mass (`penalty`, `regularised`) or none
 (`dlft`). Speeds reach from a tenth of the vibration to a thousand times as much; 3 to 12 harmonics,
-128 to 512 instants, or events where no anchor is carried along in two directions.
+128 to 512 instants, or events.
 
 The judge takes the displacements and forces of the result. It marches every pair by itself, with
 its anchor carried along, from instant to instant until a turn repeats, and holds the harmonics of
@@ -60,10 +60,7 @@ def drawn(seed):
     speed = np.zeros((pairs, 2))
     if events and random.random() < 0.5:
         sliding = "path"
-        # Two directions are carried along at instants.
-        if not two:
-            speed[:, 0] = fast * random.choice([-1.0, 1.0])
-    elif sliding == "steady" or random.random() < 0.8:
+    if events or sliding == "steady" or random.random() < 0.8:
         speed[:, 0] = fast * random.choice([-1.0, 1.0])
         if two:
             speed[:, 1] = fast * random.uniform(-1.0, 1.0)

@@ -249,6 +249,34 @@ def test_events_agree_with_many_instants(tmp_path, law, speed):
     assert distance(found.fraction, wanted.fraction) < 2e-3
 
 
+# Both tangential directions, where instants come near in the first order: extrapolated they agree.
+@pytest.mark.parametrize("speed", [1e-3, -0.05, 2.0])
+@pytest.mark.parametrize("law", ("penalty", "dlft", "dlft_velocity"))
+def test_events_in_two_directions_are_the_limit_of_instants(tmp_path, law, speed):
+    groups = oracle("v4_rub_path")["groups"]
+    groups["contact"] |= {"law": law, "side_1": [4, 5, 6, 7, 8, 9], "speed_1": [speed, -speed],
+                          "speed_2": [0.4 * speed, 0.7 * speed]}
+    if law != "penalty":
+        del groups["contact"]["tangential_stiffness"], groups["contact"]["normal_stiffness"]
+    found = run_case(tmp_path, by_events(at(groups, 100.0)))
+    few, many = (run_case(tmp_path, merged(at(groups, 100.0), {"harmonics": {"n_time": n}}))
+                 for n in (2048, 4096))
+    assert found.converged.all()
+    for name, near in (("coefficients", 1e-5), ("force", 1e-4), ("dissipation", 1e-4)):
+        limit = 2.0 * np.asarray(getattr(many, name)) - np.asarray(getattr(few, name))
+        assert distance(getattr(found, name), limit) < near
+    # Loads and obstacle feed friction and damping.
+    u = found.coefficients[0]
+    load = np.zeros_like(u)
+    load[1], load[2] = groups["load"]["cosine"], groups["load"]["sine"]
+    damping = np.reshape(groups["model"]["damping"], (9, 9))
+    lost = sum(np.pi * n**2 * 100.0 * a @ damping @ a
+               for n in range(1, (len(u) + 1) // 2) for a in (u[2 * n - 1], u[2 * n]))
+    brought = work(load, u) + found.obstacle_work.sum()
+    assert abs(brought - lost - found.dissipation.sum()) < 1e-6 * (abs(lost) + abs(
+        found.dissipation).sum())
+
+
 # A surface that slides changes forces by itself with the frequency: a branch needs dR/d omega.
 @pytest.mark.parametrize("law", ("penalty", "dlft", "dlft_velocity"))
 def test_a_branch_by_events(tmp_path, law):

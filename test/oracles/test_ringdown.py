@@ -211,3 +211,23 @@ def test_few_cycles(tmp_path, n_cycles, swings):
     found = read(tmp_path / "case.h5")
     assert found["ringdown/omega"].shape == (swings,)
     assert found["ringdown/damping_ratio"] == pytest.approx([0.005] * max(0, swings - 2), rel=1e-4)
+
+
+def test_large_damping(tmp_path):
+    """d/sqrt(4 pi^2 + d^2) of the decrement d: the ratio of one mass, however large."""
+    run(tmp_path, {"case": {"analysis": "ringdown"},
+                   "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.8},
+                   "ringdown": {"amplitude": 1.0, "n_cycles": 3, "steps_per_period": STEPS}})
+    found = read(tmp_path / "case.h5")["ringdown/damping_ratio"]
+    assert found == pytest.approx(0.4, rel=20.0 * LINEAR)
+
+
+@pytest.mark.parametrize("joined", [0.0, 0.01])
+def test_repeated_modes_are_remarked(tmp_path, joined):
+    run(tmp_path, {"case": {"analysis": "ringdown"},
+                   "model": {"n_dof": 2, "mass": np.eye(2), "stiffness": np.eye(2) + joined,
+                             "damping": 0.02 * np.eye(2)},
+                   "ringdown": {"amplitude": 1.0, "n_cycles": 3, "steps_per_period": 200},
+                   "output": {"observe": [2]}})
+    remarks = read(tmp_path / "case.h5").get("remarks/name", [])
+    assert (b"repeated mode" in list(remarks)) == (joined == 0.0)

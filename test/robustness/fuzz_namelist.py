@@ -13,7 +13,7 @@ KEYS = {
     "model": ["source", "file", "unit_system", "n_dof", "mass", "stiffness", "damping",
               "structural_damping", "circulatory", "stiffness_unsymmetric", "damping_unsymmetric",
               "n_rows", "row", "rayleigh_mass", "rayleigh_stiffness", "modal_damping",
-              "modal_damping_up_to", "rotation_speed", "loss_factor"],
+              "modal_damping_of", "modal_damping_up_to", "rotation_speed", "loss_factor"],
     "body": ["mass"],
     "cyclic": ["n_sectors", "engine_order", "mistuned", "n_modes", "n_interface", "left", "right"],
     "mistuning": ["n_rows", "rows", "row_omega", "frequency", "damping_ratio", "stiffness", "mass",

@@ -9,8 +9,8 @@ from project import PATIENT, PROGRAM
 from fretwear._namelist import literal
 from fretwear._namelist import write_namelist as namelist_text
 
-__all__ = ["literal", "merged", "read", "run", "run_reference", "signal_at", "with_model",
-           "write_namelist", "write_parts"]
+__all__ = ["literal", "merged", "namelist_text", "read", "run", "run_reference", "signal_at",
+           "with_model", "write_namelist", "write_parts"]
 
 
 def write_namelist(path, groups):

@@ -4,6 +4,7 @@ from one set of shares to another."""
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import root
 
 
 def march(y, q):
@@ -142,6 +143,37 @@ class Balance:
                 continue
             step *= 0.5
             if step < 1.0 / 16.0:
+                return None
+        return u
+
+    def solve_anyhow(self, omega, shares, u, tolerance=1e-12):
+        """Newton's method, or Powell's hybrid one where it turns between two sides of a kink."""
+        found = self.solve(omega, shares, u, tolerance)
+        if found is not None:
+            return found
+        Z, scale = self.stiffness(omega), np.abs(self.load).max()
+
+        def both(x):
+            R, J, _, _ = self.residual(x.reshape(u.shape), Z, shares)
+            return R / scale, J / scale
+
+        there = root(both, u.ravel(), jac=True, options={"maxfev": 400, "xtol": 1e-15})
+        found = there.x.reshape(u.shape)
+        near = np.abs(there.fun).max() <= 1e-9
+        return self.solve(omega, shares, found, 1e-9) if near else None
+
+    def follow(self, omega, u, shares, part=0.03):
+        """From the central solution straight to shares, in steps that change the vibration by that
+        part of it at most; None where a fold or a jump ends the way."""
+        size, at, step = np.linalg.norm(u[1:]), 0.0, 0.125
+        while at < 1.0:
+            to = min(1.0, at + step)
+            found = self.solve_anyhow(omega, to * shares, u)
+            if found is not None and np.linalg.norm(found[1:] - u[1:]) <= part * size:
+                u, at, step = found, to, min(2.0 * step, 0.125)
+                continue
+            step *= 0.5
+            if step < 2.0**-20:
                 return None
         return u
 

@@ -23,13 +23,16 @@ module support_forces
 contains
 
    !> Pairs that remember their position, or not (velocity level), decided at instants or by events.
-   subroutine new_forces(mu, present, remembers, events, fourier, self)
+   !> With speeds of side 2 [force] an angle of 1 is a unit of time.
+   subroutine new_forces(mu, present, remembers, events, fourier, self, speed)
       real(wp), intent(in) :: mu(:)
       !> Which components exist (3, n_pairs).
       logical, intent(in) :: present(:, :)
       logical, intent(in) :: remembers, events
       type(fourier_type), intent(in) :: fourier
       type(forces_type), intent(out) :: self
+      !> (n_pairs, 2).
+      real(wp), intent(in), optional :: speed(:, :)
       class(pair_law), allocatable :: law
 
       if (remembers) then
@@ -38,14 +41,26 @@ contains
          allocate (law, source=rigid_friction_of_rates())
       end if
       call law%take_pairs(mu, present)
+      if (has_speed(speed)) then
+         law%prediction%speed = speed
+         law%prediction%stiffness = 1.0_wp
+      end if
       if (events) then
          call law%located(self%law)
       else
          call move_alloc(law, self%law)
       end if
       call self%law%reserve(fourier, self%force_workspace)
+      self%rate = 1.0_wp
       call self%measure_slip()
    end subroutine new_forces
+
+   !> A dummy of its own: `present` names components above.
+   pure logical function has_speed(speed)
+      real(wp), intent(in), optional :: speed(:, :)
+
+      has_speed = present(speed)
+   end function has_speed
 
    subroutine evaluate(self, fourier)
       class(forces_type), intent(inout) :: self

@@ -98,7 +98,8 @@ def read_structure(result: Result) -> Structure:
             mass, stiffness, damping, static, session.part("load/cosine"),
             session.part("load/sine"), first - second, session.part("contact/gap"),
             session.part("observe/matrix").reshape(-1, n), (first, second),
-            wave, read_whirl(session, n), _waves(session, n))
+            wave, read_whirl(session, n, n if wave is None else n - len(wave.right)),
+            _waves(session, n))
 
 
 def _waves(session: Session, n: int) -> tuple[tuple[int, int, Floats, Floats], ...]:
@@ -165,7 +166,7 @@ def recover_displacement(result: Result, structure: Structure | None = None,
             inner = (force[point, 2 * h - 1] - 1j * force[point, 2 * h]) @ rows.conj()
             tied = tie.conj().T @ z @ tie
             if s.whirl is not None:
-                tied += s.whirl.added(h, result.omega[point], tie, s.mass, s.stiffness)
+                tied += s.whirl.added(h, result.omega[point], tie)
             u = tie @ la.solve(tied, outer[point] - inner)
             displacement[point, 2 * h - 1], displacement[point, 2 * h] = u.real, -u.imag
     _check(result, s, displacement, known & result.converged)

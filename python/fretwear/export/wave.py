@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import h5py
 import numpy as np
-import scipy.linalg as la
 from numpy.typing import NDArray
 
 from .._native import Session, namelist_values
@@ -99,8 +98,8 @@ class Whirl:
         Rows of motion that the air acts on.
     air : (H, a, a)
         Its complex stiffness in each harmonic from 1.
-    modal_damping : float
-        Fraction of critical damping of every mode of every nodal diameter.
+    modal_damping : (H, m, m)
+        Damping of the modes of each harmonic from 1, on its free dofs; H = 0 where there is none.
     circulatory, structural : (n, n) or None
         Skew part of the stiffness, and hysteretic damping.
     """
@@ -108,12 +107,11 @@ class Whirl:
     coriolis: Floats | None
     modes: Floats
     air: Complexes
-    modal_damping: float
+    modal_damping: Complexes
     circulatory: Floats | None = None
     structural: Floats | None = None
 
-    def added(self, harmonic: int, omega: float, tie: Complexes, mass: Floats,
-              stiffness: Floats) -> Complexes:
+    def added(self, harmonic: int, omega: float, tie: Complexes) -> Complexes:
         """Dynamic stiffness on the free dofs of a harmonic."""
         n = tie.shape[1]
         w = harmonic * omega
@@ -127,21 +125,23 @@ class Whirl:
         if len(self.air):
             rows = self.modes @ tie
             found += rows.conj().T @ self.air[harmonic - 1] @ rows
-        if self.modal_damping > 0.0:
-            tied = tie.conj().T @ mass @ tie
-            squares, shapes = la.eigh(tie.conj().T @ stiffness @ tie, tied)
-            sides = tied @ shapes
-            found += 2j * w * self.modal_damping * (
-                sides * np.sqrt(np.maximum(squares, 0.0))) @ sides.conj().T
+        if len(self.modal_damping):
+            found += 1j * w * self.modal_damping[harmonic - 1]
         return found
 
 
-def read_whirl(session: Session, n: int) -> Whirl:
-    """What a case has of these forces."""
+def _modal_damping(session: Session, free: int) -> Complexes:
+    parts = session.part("modal_damping").reshape(-1, free, free, 2)
+    found: Complexes = parts[..., 0] + 1j * parts[..., 1]
+    return found
+
+
+def read_whirl(session: Session, n: int, free: int) -> Whirl:
+    """What a case has of these forces: of n dofs, and of those that are free."""
     coriolis, modes = session.part("coriolis"), session.part("aero/modes").reshape(-1, n)
     air = session.part("aero/stiffness").reshape(-1, max(1, len(modes)), max(1, len(modes)), 2)
     return Whirl(coriolis.reshape(n, n) if len(coriolis) else None, modes,
-                 air[..., 0] + 1j * air[..., 1], float(session.part("modal_damping")[0]),
+                 air[..., 0] + 1j * air[..., 1], _modal_damping(session, free),
                  *(matrix.reshape(n, n) if len(matrix := session.part(name)) else None
                    for name in ("circulatory", "structural_damping")))
 

@@ -28,6 +28,7 @@ from .build import (
     save,
 )
 from .calculix import Job, deck_loads, find_job, supports_of
+from .ccx import add_ccx_arguments, ccx_files
 from .checks import check_model
 from .contact import add_contact_arguments, pairs_of_options
 from .deck import Deck, read_deck
@@ -46,7 +47,7 @@ from .sectors import (
     read_interfaces,
 )
 from .stress import StressRows, read_stress_points, read_stress_table, stress_of_rows
-from .tables import Pairs, add_load, contact_rows, read_loads, read_pairs
+from .tables import Pairs, add_load, contact_rows, read_loads, read_pairs, rows_by_sector
 from .wheel import PICTURES, draw_wheel, wheel_of
 
 __all__ = ["FORMATS", "Accuracy", "BladeNodes", "Dofs", "Finding", "FullModel", "ImportedMesh",
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "which way the wave of --engine-order runs, and -o is written too")
     parser.add_argument("--engine-order", type=int, metavar="M",
                         help="of the picture of --check (default: 1)")
+    add_ccx_arguments(parser)
     for role in ROLES:
         parser.add_argument("--" + role.replace("_", "-"), metavar="FILE[#NAME]",
                             type=Source.of, help=f"{role.replace('_', ' ')} matrix")
@@ -167,13 +169,14 @@ def main(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.absolute().parent.is_dir():
         raise OutputError(f"no folder to write {options.output} into")
     chosen_engine(options.factor)   # refused before the work
+    options.files = ccx_files(options)
     model = _read(options)
     found = [note if isinstance(note, Finding) else Finding("note", "files", note)
              for note in model.notes] + check_model(model, options.factor)
     wanted = _modes(options)
     whole = model
-    if options.by_diameter and options.mesh is None:
-        # The mesh of a deck has found the cut faces; nodal diameters have no common one to show.
+    if options.by_diameter:
+        # The mesh has found surfaces and cut faces; nodal diameters have no common one to show.
         model = replace(model, mesh=None)
     wrong = [finding for finding in found if finding.kind == "error"]
     if not wrong and options.check is not None and wanted is not None:
@@ -379,11 +382,13 @@ def _sector(model: FullModel, options: argparse.Namespace, from_calculix: bool) 
         raise InputError("--frames cylindrical: CalculiX stores its matrices along the global "
                          "axes, also of nodes with *TRANSFORM; leave --frames out")
     frames = options.frames or ("cartesian" if from_calculix else "cylindrical")
-    if frames == "cylindrical" and (options.contact or options.deck_contact):
-        raise InputError("--contact needs components along the global axes, which its normals are "
-                         "told in: take matrices with these, and --frames cartesian")
+    if frames == "cylindrical" and (options.contact or options.contact_neighbour
+                                    or options.deck_contact):
+        raise InputError("--contact and --contact-neighbour need components along the "
+                         "global axes, which normals are told in: take matrices with these, and "
+                         "--frames cartesian")
     left, right, said = cut_faces(options.sectors, options.left, options.right, options.axis,
-                                  model.mesh, _touching(model))
+                                  model.mesh, *_touching(model))
     interfaces = pair_faces(options.sectors, left, right, model.dofs, options.axis, model.mesh)
     model = replace(model, notes=[*model.notes, *said])
     if frames == "cartesian":
@@ -430,10 +435,14 @@ def _twice(model: FullModel, interfaces: Interfaces) -> list[Finding]:
     return found
 
 
-def _touching(model: FullModel) -> set[int]:
-    """Nodes of pairs between sectors."""
+def _touching(model: FullModel) -> tuple[set[int], set[int]]:
+    """Nodes of pairs between sectors, and nodes of surfaces that touch between sectors."""
     pairs, labels = model.pairs, model.dofs.labels
     if pairs is None or pairs.sector_2 is None or labels is None:
-        return set()
+        return set(), set()
+    if pairs.rows is not None:
+        one, two, _, sector = rows_by_sector(pairs, model.dofs.n)
+        columns = np.concatenate([rows[sector != 0].indices for rows in (one, two)])
+        return set(), {labels[k][0] for k in np.unique(columns).tolist()}
     sides = np.concatenate((pairs.side_1, pairs.side_2), axis=1)[pairs.sector_2 != 0]
-    return {labels[abs(int(dof)) - 1][0] for dof in sides[sides != 0]}
+    return {labels[abs(int(dof)) - 1][0] for dof in sides[sides != 0]}, set()

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.linalg import qr
 
 from ..errors import InputError
 from ..factors import chosen_engine
@@ -28,7 +29,7 @@ from .meshes import ImportedMesh
 from .recovery import recovery_mesh
 from .sectors import Interfaces
 from .stress import StressRows, stress_datasets
-from .tables import LOADS, Pairs, contact_rows
+from .tables import LOADS, Pairs, contact_rows, rows_by_sector
 
 __all__ = ["ROLES", "SKEW", "Accuracy", "FullModel", "Source", "drop", "gather", "model_datasets",
            "read_rows", "read_speeds", "save"]
@@ -52,6 +53,8 @@ _SYMMETRIC = 1e-13
 _MOST_SPEEDS = 3
 # fw_run works with full matrices.
 _LARGE = 3000
+#: Displacements of contact surfaces are combinations of others where less of them is new.
+_SPAN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -345,9 +348,6 @@ def model_datasets(model: FullModel, n_modes: int | Accuracy | None, by_diameter
         raise InputError("an unsymmetric stiffness does not go with --by-diameter")
     if by_diameter:
         return _by_diameter(model, symmetric, n_modes, factor)
-    if cyclic and model.pairs is not None and model.pairs.rows is not None:
-        raise InputError("pairs of sectors need degrees of freedom of their own on both sides: "
-                         "columns side_1_t1 ... side_2_n and sector_2")
     reduction: Reduction | None = None
     if n_modes is None:
         data: dict[str, NDArray[Any]] = {role: matrix.toarray()
@@ -384,9 +384,22 @@ def _sides_as_given(pairs: Pairs, n: int) -> dict[str, NDArray[Any]]:
     of degrees of freedom have their numbers behind these."""
     if pairs.rows is None:
         return {"contact/side_1": pairs.side_1, "contact/side_2": pairs.side_2}
-    side_1 = np.where(pairs.side_1 != 0, pairs.side_1 + n, 0).astype(np.int32)
-    return {"contact/side_1": side_1, "contact/side_2": np.zeros_like(side_1),
-            "row/matrix": pairs.rows.toarray()}
+    one, two, number, _ = rows_by_sector(pairs, n)
+    return _combinations(one.toarray(), two, two.toarray(), number)
+
+
+def _combinations(one: Floats, two: sp.csr_array, moved: Floats, number: NDArray[np.int32]
+                  ) -> dict[str, NDArray[Any]]:
+    """Sides as numbers of combinations, behind all degrees of freedom: those of side 1, then those
+    of side 2 (`moved`, in the coordinates of the model) that `two` has."""
+    n = one.shape[1]
+    there = np.diff(two.indptr) > 0
+    second = np.where(there, n + len(one) + np.cumsum(there), 0)
+    # The number 0 of a direction that a pair has not.
+    behind = np.concatenate(([0], second))
+    return {"contact/side_1": np.where(number != 0, number + n, 0).astype(np.int32),
+            "contact/side_2": behind[number].astype(np.int32),
+            "row/matrix": np.vstack((one, moved[there]))}
 
 
 def _at_speeds(model: FullModel, data: dict[str, NDArray[Any]],
@@ -441,6 +454,9 @@ def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array], n_modes
                     factor: str) -> tuple[dict[str, NDArray[Any]], Reduction]:
     """Interfaces and both sides of the pairs as they are, and modes with all of them held."""
     assert model.interfaces is not None
+    if model.pairs is not None and model.pairs.rows is not None:
+        return _reduced_rows(model, model.pairs, model.interfaces, matrices, n_modes, progress,
+                             factor)
     sides = np.zeros((2, 0, 3), dtype=np.int32) if model.pairs is None else np.stack(
         (model.pairs.side_1, model.pairs.side_2))
     ends = np.concatenate((model.interfaces.left, model.interfaces.right))
@@ -458,6 +474,34 @@ def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array], n_modes
         for name, side in zip(("contact/side_1", "contact/side_2"), sides):
             data[name] = np.sign(side) * place[np.abs(side)]
     return data, reduction
+
+
+def _reduced_rows(model: FullModel, pairs: Pairs, interfaces: Interfaces,
+                  matrices: dict[str, sp.csr_array], n_modes: int | Accuracy,
+                  progress: Progress | None, factor: str
+                  ) -> tuple[dict[str, NDArray[Any]], Reduction]:
+    """The same where sides of pairs are combinations of degrees of freedom: kept is what spans
+    them beside the interfaces, as more than one may share a node."""
+    n = model.dofs.n
+    one, two, number, _ = rows_by_sector(pairs, n)
+    ends = np.concatenate((interfaces.left, interfaces.right)) - 1
+    inner = np.ones(n)
+    inner[ends] = 0.0
+    beside = sp.csc_array(sp.vstack((one, two)) @ sp.diags_array(inner))
+    used = np.flatnonzero(abs(beside).sum(axis=0))
+    span, triangle, _ = qr(beside[:, used].toarray().T, mode="economic", pivoting=True)
+    size = np.abs(np.diag(triangle))
+    span = span[:, :int((size > _SPAN * size.max(initial=0.0)).sum())]
+    m = len(ends)
+    kept = sp.block_array([
+        [sp.csr_array((np.ones(m), (np.arange(m), ends)), (m, n))],
+        [sp.csr_array(span.T) @ sp.csr_array((np.ones(len(used)), (np.arange(len(used)), used)),
+                                             (len(used), n))]], format="csr")
+    data, reduction = _condensed(model, matrices, kept, n_modes, progress, factor)
+    data["cyclic/left"] = np.arange(1, m // 2 + 1, dtype=np.int32)
+    data["cyclic/right"] = np.arange(m // 2 + 1, m + 1, dtype=np.int32)
+    return data | _combinations(np.asarray(reduction.row(one)), two,
+                                np.asarray(reduction.row(two)), number), reduction
 
 
 def _condensed(model: FullModel, matrices: dict[str, sp.csr_array], rows: sp.csr_array,

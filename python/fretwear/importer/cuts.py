@@ -111,8 +111,8 @@ def named_face(name: str, mesh: ImportedMesh) -> tuple[Face, list[Finding]]:
     return Face(name, nodes, np.array([place[node] for node in nodes])), found
 
 
-def faces_by_turning(mesh: ImportedMesh, n_sectors: int, axis: str,
-                     leave: Collection[int]) -> tuple[Face, Face, list[Finding]]:
+def faces_by_turning(mesh: ImportedMesh, n_sectors: int, axis: str, leave: Collection[int],
+                     surfaces: Collection[int] = ()) -> tuple[Face, Face, list[Finding]]:
     """Both cut faces of the mesh of a sector: faces of its surface that lie on others when they are
     turned by a sector.
 
@@ -120,6 +120,8 @@ def faces_by_turning(mesh: ImportedMesh, n_sectors: int, axis: str,
     ----------
     leave : collection of int
         Nodes of contact pairs between sectors, which touch and are not tied.
+    surfaces : collection of int
+        Nodes of surfaces that touch between sectors: faces of these nodes alone are not tied.
 
     Raises
     ------
@@ -130,7 +132,8 @@ def faces_by_turning(mesh: ImportedMesh, n_sectors: int, axis: str,
     turn = rotation(axis, 2.0 * np.pi / n_sectors)
     by = f"turned by {360.0 / n_sectors:g} degrees about {axis}"
     surface = [face for face in surface_faces(mesh)
-               if not any(int(mesh.nodes[k]) in leave for k in face)]
+               if not any(int(mesh.nodes[k]) in leave for k in face)
+               and not all(int(mesh.nodes[k]) in surfaces for k in face)]
     partner = _partners(mesh, surface, turn, by)
     if not partner:
         raise InputError(f"{mesh.path}: no node, {by}, lies on another: is the number of sectors "
@@ -144,8 +147,12 @@ def faces_by_turning(mesh: ImportedMesh, n_sectors: int, axis: str,
     there = {tuple(sorted(face)) for face in surface}
     left = [face for face in surface if all(k in partner for k in face)
             and tuple(sorted(partner[k] for k in face)) in there]
-    _refuse_other_meshes(mesh, surface, partner, turn, by)
-    stray = sorted(set(partner) - {k for face in left for k in face})
+    # Corners that touch lie on others as the tied ones do, in faces beside those that touch.
+    tied = {k for face in left for k in face}
+    touching = set(np.flatnonzero(np.isin(mesh.nodes, list(surfaces))).tolist()) - tied
+    partner = {k: other for k, other in partner.items() if k not in touching}
+    _refuse_other_meshes(mesh, surface, partner, turn, by, touching)
+    stray = sorted(set(partner) - tied)
     if stray:
         raise InputError(f"{mesh.path}: {len(stray)} nodes, {by}, lie on others without a face "
                          f"that does, node {_of_mesh(mesh, stray[0])}: the mesh is not the same "
@@ -299,15 +306,16 @@ def _partners(mesh: ImportedMesh, surface: list[tuple[int, ...]], turn: Floats,
 
 
 def _refuse_other_meshes(mesh: ImportedMesh, surface: list[tuple[int, ...]],
-                         partner: dict[int, int], turn: Floats, by: str) -> None:
+                         partner: dict[int, int], turn: Floats, by: str,
+                         touching: set[int]) -> None:
     """Nodes that lie within a face of the surface when they are turned, between its nodes: there
-    the meshes of both cut faces differ, or parts touch."""
+    the meshes of both cut faces differ, or parts touch that are not to (`touching`)."""
     corners = np.unique([k for face in surface for k in face])
     middles = np.array([mesh.points[list(face)].mean(axis=0) for face in surface])
     tree = cKDTree(middles)
     sides = ((turn, set(partner)), (turn.T, set(partner.values())))
     for matrix, matched in sides:
-        free = np.array([k for k in corners.tolist() if k not in matched], dtype=np.int64)
+        free = np.array(sorted(set(corners.tolist()) - matched - touching), dtype=np.int64)
         if not len(free):
             continue
         turned = mesh.points[free] @ matrix.T

@@ -20,7 +20,7 @@ from ..reduction import reduce
 from ..sectors import NodalDiameter, Sectors
 from .accuracy import Accuracy, mode_options, range_datasets
 from .sectors import Interfaces, tie
-from .tables import contact_rows, side_rows
+from .tables import rows_by_sector
 
 if TYPE_CHECKING:
     from .build import FullModel
@@ -53,13 +53,7 @@ def reduce_diameters(model: FullModel, matrices: Mapping[str, sp.csr_array],
     if pairs is None:
         raise InputError("--by-diameter needs contact pairs (--pairs): it keeps their relative "
                          "displacements")
-    if pairs.rows is None:
-        one, two, number = side_rows(pairs, model.dofs.n)
-        across = np.zeros(len(pairs), dtype=int) if pairs.sector_2 is None else pairs.sector_2
-        sector = across[np.nonzero(number)[0]]
-    else:
-        one, number = contact_rows(pairs, model.dofs.n)
-        two, sector = sp.csr_array(one.shape), np.zeros(one.shape[0], dtype=int)
+    one, two, number, sector = rows_by_sector(pairs, model.dofs.n)
     found, errors = {}, []
     for k in range(interfaces.n_sectors // 2 + 1):
         turns = factor(interfaces.n_sectors, k, sector)

@@ -21,7 +21,7 @@ from ..mesh import RecoveryMesh
 from ..reduction import Reduction
 from .finding import Finding
 from .meshes import ImportedMesh
-from .tables import side_rows
+from .tables import rows_by_sector
 
 if TYPE_CHECKING:
     from .build import FullModel
@@ -249,11 +249,8 @@ def _pairs_of_points(model: FullModel, mesh: ImportedMesh) -> Ints:
     found = np.full(len(mesh.points), -1, dtype=np.int64)
     if model.pairs is None:
         return found
-    if model.pairs.rows is not None:
-        rows, number = abs(model.pairs.rows), model.pairs.side_1
-    else:
-        one, two, number = side_rows(model.pairs, model.dofs.n)
-        rows = abs(one) + abs(two)
+    one, two, number, _ = rows_by_sector(model.pairs, model.dofs.n)
+    rows = abs(one) + abs(two)
     pair, direction = np.nonzero(number)
     gather = sp.csr_array((np.ones(len(pair)), (pair, number[pair, direction] - 1)),
                           (len(number), rows.shape[0]))

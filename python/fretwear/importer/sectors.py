@@ -115,8 +115,8 @@ def pair_faces(n_sectors: int, left: Face, right: Face, dofs: Dofs, axis: str = 
 
 
 def cut_faces(n_sectors: int, left: str | None, right: str | None, axis: str,
-              mesh: ImportedMesh | None,
-              leave: Collection[int] = ()) -> tuple[Face, Face, list[Finding]]:
+              mesh: ImportedMesh | None, leave: Collection[int] = (),
+              surfaces: Collection[int] = ()) -> tuple[Face, Face, list[Finding]]:
     """Both cut faces: of tables, of sets of the mesh in either order, or found by turning it.
 
     Parameters
@@ -125,13 +125,15 @@ def cut_faces(n_sectors: int, left: str | None, right: str | None, axis: str,
         File of a table, or name of a set.
     leave : collection of int
         Nodes that touch those of other sectors and are not tied.
+    surfaces : collection of int
+        Nodes of faces that touch those of other sectors; tied faces may have some of them.
     """
     check_sectors(n_sectors)
     if left is None or right is None:
         if mesh is None:
             raise InputError("--sectors needs --left and --right, tables or sets of nodes of the "
                              "cut faces, or a mesh (--mesh) in which they are found by turning it")
-        return faces_by_turning(mesh, n_sectors, axis, leave)
+        return faces_by_turning(mesh, n_sectors, axis, leave, surfaces)
     turn = rotation(axis, 2.0 * np.pi / n_sectors)
     found: list[Finding] = []
     faces, named = [], 0
@@ -151,7 +153,7 @@ def cut_faces(n_sectors: int, left: str | None, right: str | None, axis: str,
         found.append(Finding("note", "interfaces", f"{one.name}, turned by a sector about {axis}, "
                              f"lies on {two.name}: it is the left face"))
     if mesh is not None and named == 2:
-        behind = left_behind(mesh, one, turn, leave)
+        behind = left_behind(mesh, one, turn, {*leave, *surfaces})
         found += [] if behind is None else [behind]
     return one, two, found
 
@@ -190,7 +192,8 @@ def in_sector_frames(model: FullModel, interfaces: Interfaces) -> FullModel:
             model.stress, rows=sp.csr_array(model.stress.rows @ q)),
         # Rows are of the degrees of freedom of the files, as those of stress.
         pairs=model.pairs if model.pairs is None or model.pairs.rows is None else replace(
-            model.pairs, rows=sp.csr_array(model.pairs.rows @ q)),
+            model.pairs, rows=sp.csr_array(model.pairs.rows @ q),
+            rows_2=None if model.pairs.rows_2 is None else sp.csr_array(model.pairs.rows_2 @ q)),
         notes=[*model.notes, f"{len(interfaces.right_nodes)} nodes of the right interface are in "
                "the frame of the next sector"])
 

@@ -17,7 +17,7 @@ from ..errors import InputError, OutputError
 from .labels import Dofs
 
 __all__ = ["LOADS", "Pairs", "add_load", "contact_rows", "read_loads", "read_pairs", "read_table",
-           "side_rows"]
+           "rows_by_sector", "side_rows"]
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +43,7 @@ class Pairs:
         Signed dof numbers (from 1) of t1, t2 and n; 0 for none or the ground.
     rows : (n_rows, n) sparse array or None
         Relative displacements of pairs given by nodes and normals; their side_1 counts these rows.
+        Where `rows_2` is there too, displacements of side 1.
     mu, gap, area : (n_pairs,) or None
         Where the table has them; area [L^2], gap [L].
     position : (n_pairs, 3) or None
@@ -53,6 +54,9 @@ class Pairs:
         Line of the table, for messages.
     sector_2 : (n_pairs,) int or None
         Sector of side 2, where the table has it.
+    rows_2 : (n_rows, n) sparse array or None
+        Displacements of side 2 in its sector, which the relative ones are less; none where
+        `sector_2` is 0.
     """
 
     side_1: NDArray[np.int32]
@@ -65,6 +69,7 @@ class Pairs:
     patch: list[str] | None
     where: list[str]
     sector_2: NDArray[np.int32] | None = None
+    rows_2: sp.csr_array | None = None
 
     def __len__(self) -> int:
         return len(self.where)
@@ -171,10 +176,32 @@ def contact_rows(pairs: Pairs, n: int) -> tuple[sp.csr_array, NDArray[np.int32]]
     number : (n_pairs, 3) int
         Row (from 1) of t1, t2 and n; 0 where the pair has no such direction.
     """
-    if pairs.rows is not None:
-        return pairs.rows, pairs.side_1
-    one, two, number = side_rows(pairs, n)
+    one, two, number, _ = rows_by_sector(pairs, n)
     return sp.csr_array(one - two), number
+
+
+def rows_by_sector(pairs: Pairs, n: int) -> tuple[sp.csr_array, sp.csr_array, NDArray[np.int32],
+                                                   NDArray[np.int64]]:
+    """Displacements of side 1 and of side 2 of pairs, which are those of sector 0 and of another.
+
+    Returns
+    -------
+    one, two : (n_rows, n) sparse array
+        Relative displacements are one u_0 - two u_s; two is empty where `one` has them whole.
+    number : (n_pairs, 3) int
+        Row (from 1) of t1, t2 and n; 0 where the pair has no such direction.
+    sector : (n_rows,) int
+        The sector s.
+    """
+    if pairs.rows is None:
+        one, two, number = side_rows(pairs, n)
+    else:
+        one, number = pairs.rows, pairs.side_1
+        two = sp.csr_array(one.shape) if pairs.rows_2 is None else pairs.rows_2
+    across = (np.zeros(len(pairs), dtype=np.int64) if pairs.sector_2 is None
+              else pairs.sector_2.astype(np.int64))
+    # Rows are numbered pair by pair.
+    return one, two, number, across[np.nonzero(number)[0]]
 
 
 def side_rows(pairs: Pairs, n: int) -> tuple[sp.csr_array, sp.csr_array, NDArray[np.int32]]:

@@ -27,7 +27,7 @@ from .diameters import factor
 from .finding import Finding
 from .recovery import point_motion, surface_faces
 from .sectors import axis_of, tie
-from .tables import contact_rows, side_rows
+from .tables import rows_by_sector
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -198,12 +198,9 @@ def _held(model: FullModel, diameter: int) -> sp.csr_array:
     """Relative displacements of the pairs, side 2 in its sector."""
     pairs = model.pairs
     assert pairs is not None and model.interfaces is not None
-    if pairs.rows is not None:
-        return contact_rows(pairs, model.dofs.n)[0]
-    one, two, number = side_rows(pairs, model.dofs.n)
-    across = np.zeros(len(pairs), dtype=int) if pairs.sector_2 is None else pairs.sector_2
+    one, two, _, across = rows_by_sector(pairs, model.dofs.n)
     n = model.interfaces.n_sectors
-    turns = factor(n, diameter % n, across[np.nonzero(number)[0]])
+    turns = factor(n, diameter % n, across)
     return sp.csr_array(one - sp.diags_array(turns) @ two)
 
 

@@ -327,18 +327,37 @@ contains
       !> As evaluate_pair.
       logical, intent(in) :: may_rest
       real(wp), intent(in) :: mean(2)
+      real(wp) :: carry(2)
 
       associate (pair => self%planar(i))
          self%rests(i) = .false.
+         if (allocated(self%carry)) then
+            carry = self%carry(i, :)
+            if (any(abs(carry) > 0.0_wp) .and. .not. pair%remembers) then
+               ! Rates are those against the surface, and come to rest nowhere.
+               call pair%follow(self%cells, fourier, prediction, offset, x_start, rate=carry)
+               call take_results(self, i)
+               return
+            end if
+            call pair%take_drift(carry)
+         end if
          if (may_rest) call pair%follow_to_rest(self%cells, fourier, prediction, offset, x_start, &
                                                 mean, self%rests(i))
          if (.not. self%rests(i)) call pair%follow(self%cells, fourier, prediction, offset, x_start)
-         self%closed(i) = pair%closed
-         self%open(i) = pair%open
-         self%moved(i) = pair%moved
-         self%drift(i) = pair%drift
       end associate
+      call take_results(self, i)
    end subroutine evaluate_planar
+
+   !> What the path of a pair with two tangential directions was.
+   subroutine take_results(self, i)
+      class(event_contact_type), intent(inout) :: self
+      integer, intent(in) :: i
+
+      self%closed(i) = self%planar(i)%closed
+      self%open(i) = self%planar(i)%open
+      self%moved(i) = self%planar(i)%moved
+      self%drift(i) = self%planar(i)%drift
+   end subroutine take_results
 
    !> Coefficients of the forces of a pair: projected exactly, or fitted at the instants of the
    !> collocation.

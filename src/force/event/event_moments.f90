@@ -25,6 +25,7 @@ module fw_event_moments
       procedure :: reserve
       procedure :: clear
       procedure :: add_step
+      procedure :: add_ramp
       procedure :: finish
       procedure :: set
       procedure :: project
@@ -69,6 +70,22 @@ contains
          self%sine(m) = self%sine(m) - drop*cosines(m)
       end do
    end subroutine add_step
+
+   !> chi is slope tau up to an angle; a start there takes the slope with the other sign.
+   !> By parts once more, int tau cos(m tau) = (tau sin(m tau) + cos(m tau)/m)/m.
+   pure subroutine add_ramp(self, slope, angle, cosines, sines)
+      class(moments_type), intent(inout) :: self
+      real(wp), intent(in) :: slope, angle
+      !> (0:2 degree).
+      real(wp), intent(in) :: cosines(0:), sines(0:)
+      integer :: m
+
+      self%cosine(0) = self%cosine(0) + 0.5_wp*slope*angle**2
+      do m = 1, 2*self%degree
+         self%cosine(m) = self%cosine(m) + slope*(angle*sines(m) + cosines(m)/m)
+         self%sine(m) = self%sine(m) + slope*(sines(m)/m - angle*cosines(m))
+      end do
+   end subroutine add_ramp
 
    !> Divide by m and mirror, once all steps are in.
    pure subroutine finish(self)

@@ -1,9 +1,12 @@
 !> The predicted forces of one pair with two tangential directions as trigonometric polynomials: P
 !> (2) and N = -y_n with two derivatives, R = mu N, at the points of the cells and at any angle.
+!>
+!> Where side 2 slides, P is taken in a frame that goes along, P - drift tau: anchors stand there
+!> while the pair sticks, whatever carries them.
 module fw_event_motion
    use fw_event_cells, only: cells_type
    use fw_event_stages, only: cosine_and_sine, n_points
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_lapack, only: dgemm
    implicit none (type, external)
    private
@@ -37,7 +40,10 @@ module fw_event_motion
       real(wp) :: mu = 0.0_wp
       !> False: velocity-level law, T = P projected onto the disc of radius R.
       logical :: remembers = .true.
-      !> P (0:degree, cosine and sine, direction) and N (0:degree, cosine and sine).
+      !> What the frame moves in an angle of 1 [force].
+      real(wp) :: drift(2) = 0.0_wp
+      !> P of the frame at rest (0:degree, cosine and sine, direction) and N (0:degree, cosine
+      !> and sine).
       real(wp), allocatable :: tangential(:, :, :), normal(:, :)
       !> Sum of the amplitudes of P, and of those of R; and N is constant.
       real(wp) :: scale = 0.0_wp, largest_radius = 0.0_wp
@@ -55,6 +61,7 @@ module fw_event_motion
       procedure :: reserve
       procedure :: fill
       procedure :: can_rest
+      procedure :: is_carried
       procedure :: look
       procedure :: stretch
    end type motion_type
@@ -115,7 +122,7 @@ contains
       ! Parity carries no constant; the offset is all that there is then.
       if (cells%harmonic(1) > 0) self%normal(0, 1) = 0.0_wp
       self%normal(0, 1) = self%normal(0, 1) - offset
-      self%scale = sum(abs(self%tangential))
+      self%scale = sum(abs(self%tangential)) + 2.0_wp*pi*sum(abs(self%drift))
       self%largest_radius = self%mu*sum(abs(self%normal))
       self%steady = .not. any(abs(self%normal(1:, :)) > 0.0_wp)
       do n = 0, self%degree
@@ -127,8 +134,33 @@ contains
       n = n_points*cells%n_cells
       call dgemm('N', 'N', n, 9, nc, 1.0_wp, cells%wave, n, self%series, nc, 0.0_wp, self%point, n)
       self%point(:, :, 7) = self%point(:, :, 7) - offset
+      if (self%is_carried()) call enter_frame(self, cells)
       call fill_instants(self, cells, offset)
    end subroutine fill
+
+   !> Whether side 2 takes the anchors along.
+   pure logical function is_carried(self)
+      class(motion_type), intent(in) :: self
+
+      is_carried = any(abs(self%drift) > 0.0_wp)
+   end function is_carried
+
+   !> The points of the cells in the frame that goes along.
+   pure subroutine enter_frame(self, cells)
+      type(motion_type), intent(inout) :: self
+      type(cells_type), intent(in) :: cells
+      integer :: c, k
+
+      do c = 1, 2
+         do k = 1, cells%n_cells
+            associate (from => cells%start_of(k), to => cells%start_of(k + 1))
+               self%point(:, k, c) = self%point(:, k, c) - &
+                                     self%drift(c)*(from + (to - from)*cells%rule%place)
+            end associate
+         end do
+         self%point(:, :, c + 2) = self%point(:, :, c + 2) - self%drift(c)
+      end do
+   end subroutine enter_frame
 
    !> N and N' at the instants.
    pure subroutine fill_instants(self, cells, offset)
@@ -223,6 +255,10 @@ contains
       end do
       at%p = value(1:2)
       at%dp = slope(1:2)
+      if (self%is_carried()) then
+         at%p = at%p - self%drift*angle
+         at%dp = at%dp - self%drift
+      end if
       at%ddp = curvature(1:2)
       call set_normal(self, [value(3), slope(3), curvature(3)], at)
    end function look
@@ -283,6 +319,12 @@ contains
          s = s*c_1 + c*s_1
          c = wave
       end do
+      if (self%is_carried()) then
+         do j = 1, 2
+            out%p(:, j) = out%p(:, j) - self%drift(j)*(from + (to - from)*cells%rule%place)
+            out%dp(:, j) = out%dp(:, j) - self%drift(j)
+         end do
+      end if
       ! Where contact begins or ends, N is round-off of either sign.
       out%normal = max(out%normal, 0.0_wp)
       out%radius = self%mu*out%normal

@@ -161,30 +161,21 @@ contains
       call self%stick%finish()
       call self%slip%finish()
       call self%contact%finish()
-      call self%held%finish()
       if (abs(self%path%carry) > 0.0_wp) call add_carried(self)
+      call self%held%finish()
    end subroutine fill_moments
 
-   !> What side 2 carries z along while the pair sticks, carry tau: its integrals against the waves,
-   !> by parts.
+   !> What side 2 carries z along while the pair sticks, carry tau.
    pure subroutine add_carried(self)
       class(event_pair_type), intent(inout) :: self
-      real(wp) :: angle, side
-      integer :: j, k, m
+      integer :: j, k
 
       do j = 1, self%path%n_segments
          if (self%path%phase(j) /= phase_stick) cycle
          do k = j, j + 1
-            side = merge(-1.0_wp, 1.0_wp, k == j)*self%path%carry
-            angle = self%path%angle(k)
             call set_waves(self, k)
-            self%held%cosine(0) = self%held%cosine(0) + 0.5_wp*side*angle**2
-            do m = 1, 2*self%held%degree
-               associate (c => self%cosines(m), s => self%sines(m))
-                  self%held%cosine(m) = self%held%cosine(m) + side*(angle*s/m + c/m**2)
-                  self%held%sine(m) = self%held%sine(m) + side*(s/m**2 - angle*c/m)
-               end associate
-            end do
+            call self%held%add_ramp(merge(-1.0_wp, 1.0_wp, k == j)*self%path%carry, &
+                                    self%path%angle(k), self%cosines, self%sines)
          end do
       end do
    end subroutine add_carried

@@ -51,7 +51,7 @@ module fw_event_planar
       !> Of a pair without memory: whether it has come to rest.
       logical, private :: rests = .false.
       !> Whether the law of the pair has memory.
-      logical, private :: remembers = .true.
+      logical :: remembers = .true.
       !> Turns that count in the derivative.
       integer, private :: turns = 0
    contains
@@ -64,6 +64,7 @@ module fw_event_planar
       procedure :: share
       procedure :: friction_path
       procedure :: take_friction
+      procedure :: take_drift
    end type planar_pair_type
 
 contains
@@ -92,6 +93,14 @@ contains
       self%map%motion%mu = mu
    end subroutine take_friction
 
+   !> What side 2 takes the anchors along in an angle of 1 [force].
+   pure subroutine take_drift(self, drift)
+      class(planar_pair_type), intent(inout) :: self
+      real(wp), intent(in) :: drift(2)
+
+      self%map%motion%drift = drift
+   end subroutine take_drift
+
    !> A turn of period_map: the path from x [force], where it ends, and the derivative of that.
    subroutine turn(self, x, after, m)
       class(planar_map), intent(inout) :: self
@@ -105,23 +114,33 @@ contains
    end subroutine turn
 
    !> March from x_start until the position repeats; forces of the last turn.
-   subroutine follow(self, cells, fourier, prediction, offset, x_start)
+   subroutine follow(self, cells, fourier, prediction, offset, x_start, rate)
       class(planar_pair_type), intent(inout) :: self
       type(cells_type), intent(in), target :: cells
       type(fourier_type), intent(in) :: fourier
       !> Coefficients of P_x, P_y and y_n (3, n_coefficients), and what y_n has in the mean beside.
       real(wp), intent(in) :: prediction(:, :), offset
       real(wp), intent(in) :: x_start(2)
+      !> At velocity level: the rate of side 2, which that of the pair is measured against.
+      real(wp), intent(in), optional :: rate(2)
 
       self%rests = .false.
       self%map%motion%remembers = self%remembers
       self%map%cells => cells
       ! Knots and rotations depend on the prediction alone: made once, they serve all turns.
-      call self%map%motion%fill(cells, prediction, offset)
+      if (present(rate)) then
+         call self%map%motion%fill(cells, prediction, offset, -rate)
+      else
+         call self%map%motion%fill(cells, prediction, offset)
+      end if
       call self%map%path%find_knots(self%map%motion, cells)
       self%closed = self%map%path%closed
       self%open = self%map%path%open
-      call march(self, x_start)
+      if (self%map%motion%is_carried()) then
+         call march_along(self)
+      else
+         call march(self, x_start)
+      end if
       call self%integral%integrate(self%map%path, self%map%motion, cells)
       self%force = self%integral%projected
       if (.not. fourier%projects) call fit(self, cells, fourier)
@@ -191,6 +210,26 @@ contains
          if (map%motion%remembers) self%drift = maxval(abs(map%to - map%from))
       end associate
    end subroutine march
+
+   !> A pair whose anchor is carried along has one limit, since it cannot stick for ever. It is
+   !> looked for from an anchor far ahead, where friction has always pulled it back.
+   subroutine march_along(self)
+      class(planar_pair_type), intent(inout) :: self
+      real(wp) :: x(2), after(2), m(2, 2), scale
+      logical :: settled
+
+      self%moved = .true.
+      self%turns = 1
+      associate (map => self%map, motion => self%map%motion)
+         scale = motion%scale + motion%largest_radius
+         x = 2.0_wp*scale*motion%drift/norm2(motion%drift)
+         call map%turn(x, after, m)
+         x = after
+         call settle(map, motion%scale, periodic_tolerance, x, settled)
+         self%z_end = map%to
+         self%drift = maxval(abs(map%to - map%from))
+      end associate
+   end subroutine march_along
 
    !> Plain turns behind the first one; Newton's method where they creep.
    subroutine march_plainly(self, first)
@@ -262,6 +301,8 @@ contains
       if (.not. unique) then
          self%map%cells => cells
          x = x_start
+         ! One that is carried along starts where its limit does.
+         if (self%map%motion%is_carried()) x = self%map%from
          ! The turns of the march once more, with the derivatives carried along: they were not known
          ! to be wanted then, and cost far more than a turn.
          do k = 1, self%turns - 1

@@ -98,6 +98,7 @@ contains
          self%mean(c) = self%mean(c) + 0.5_wp/pi*sum(self%node(:, :, c))
          self%projected(:, c) = cells%weight*self%projected(:, c)
       end do
+      if (motion%is_carried()) call add_carried(self, path, motion%drift)
       call add_sets(self, motion, cells)
    end subroutine integrate
 
@@ -114,6 +115,26 @@ contains
          call self%held(c)%add_step(drop*z(c), angle, self%cosines, self%sines)
       end do
    end subroutine add_stick
+
+   !> What side 2 carries z along while the pair sticks, drift tau.
+   pure subroutine add_carried(self, path, drift)
+      class(planar_force_type), intent(inout) :: self
+      type(planar_path_type), intent(in) :: path
+      real(wp), intent(in) :: drift(2)
+      real(wp) :: angle
+      integer :: c, i, k
+
+      do i = 1, path%n_pieces
+         if (path%piece(i)%phase /= phase_stick) cycle
+         do k = -1, 1, 2
+            angle = merge(path%piece(i)%from, path%piece(i)%to, k < 0)
+            call fill_waves(size(self%cosines) - 1, angle, self%cosines, self%sines)
+            do c = 1, 2
+               call self%held(c)%add_ramp(k*drift(c), angle, self%cosines, self%sines)
+            end do
+         end do
+      end do
+   end subroutine add_carried
 
    !> One step of slip.
    pure subroutine add_slip(self, motion, cells, piece)

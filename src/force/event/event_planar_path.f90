@@ -201,7 +201,8 @@ contains
       real(wp), intent(out) :: z_end(2), m(2, 2)
 
       m = self%by_z
-      z_end = self%z
+      ! Seen from the frame of the next turn, which has moved on by then.
+      z_end = self%z + 2.0_wp*pi*motion%drift
       if (self%phase == phase_stick) return
       m = 0.0_wp
       ! Open, or without friction: z goes with P.
