@@ -290,14 +290,16 @@ contains
       type(model_type), intent(in) :: model
       type(matrix_change), intent(inout) :: change
       type(error_type), allocatable, intent(out) :: error
+      type(model_type) :: moved
       real(wp) :: h
       integer :: k
 
       h = step*change%value
+      moved = model
       do k = 1, size(place)
-         call add_modal_damping(model%mass + place(k)*h*change%mass, model%stiffness, &
-                                weight(k)/h*options%modal_damping, change%damping, error, &
-                                2.0_wp*pi*options%modal_damping_up_to)
+         moved%mass = model%mass + place(k)*h*change%mass
+         call damp_structure(moved, model%stiffness, weight(k)/h*options%modal_damping, &
+                             change%damping, error, 2.0_wp*pi*options%modal_damping_up_to)
          if (allocated(error)) return
       end do
    end subroutine follow_mass

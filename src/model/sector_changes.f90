@@ -56,15 +56,17 @@ contains
             change%damping(:m, :m) = matmul(conjg(transpose(t)), matmul(of%damping, t))
             change%load(:m) = matmul(conjg(transpose(t)), of%load_static)
             if (model%cyclic%modal_damping <= 0.0_wp) cycle
-            call follow_modes(model%cyclic%modal_damping, of%value, nodal, change, error)
+            call follow_modes(model, k, of%value, nodal, change, error)
             if (allocated(error)) return
          end associate
       end do
    end subroutine changes_at
 
    !> Modes turn with the mass: a difference of the square root that modal damping is.
-   subroutine follow_modes(ratio, mass, nodal, change, error)
-      real(wp), intent(in) :: ratio, mass
+   subroutine follow_modes(model, k, mass, nodal, change, error)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      real(wp), intent(in) :: mass
       type(nodal_matrices), intent(in) :: nodal
       type(nodal_change), intent(inout) :: change
       type(error_type), allocatable, intent(out) :: error
@@ -75,7 +77,7 @@ contains
          moved%mass = nodal%mass + place(i)*step*mass*change%mass
          moved%stiffness = nodal%stiffness
          if (allocated(moved%damping)) deallocate (moved%damping)
-         call damp_modes(ratio, moved, error)
+         call damp_modes(model, k, model%cyclic%modal_damping, moved, error)
          if (allocated(error)) return
          change%damping = change%damping + weight(i)/(step*mass)*moved%damping
       end do
