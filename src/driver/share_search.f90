@@ -4,9 +4,9 @@
 !> Every share that is solved is kept: ends are often corners, which several descents come to.
 !>
 !> The response over the shares may fold: behind a fold there is none near by, and a step that is
-!> too long jumps to another branch. Where one of the steps shows that, the search begins anew with ways
-!> in steps so short that none jumps. What it finds then are shares that a straight way from the
-!> centre leads to, so that anyone can go there.
+!> too long jumps to another branch. Where one of the steps shows that, the search begins anew with
+!> ways in steps so short that none jumps. What it finds then are shares that a straight way from
+!> the centre leads to, so that anyone can go there.
 module fw_share_search
    use fw_box_steps, only: box_steps, gain_left
    use fw_error, only: error_type

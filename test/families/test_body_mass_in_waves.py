@@ -66,15 +66,17 @@ def test_derivative_of_a_wave(order, tmp_path):
 
 
 @pytest.mark.parametrize("wave", [False, True])
-def test_damping_of_modes_follows(wave, tmp_path):
-    """A body that springs hold is in modes, whose damping its mass changes."""
+@pytest.mark.parametrize("joint", ["open", "stuck"])
+def test_damping_of_modes_follows(joint, wave, tmp_path):
+    """A body that springs or stuck pairs hold is in modes, whose damping its mass changes."""
     case = sliding(sectors=5, order=1) | {"wave": wave}
     groups = at(case["omega"], solver=TIGHT, sensitivity=BY_MASS)
-    groups["model"] |= {"modal_damping": 0.1}
+    groups["model"] |= {"modal_damping": 0.1, "modal_damping_of": joint}
     if wave:
         groups["cyclic"] = {"engine_order": 1}
     model = model_of(case)
-    assert against_differences(model, tmp_path, groups, stiffness=held(model)) < DIFFERENT
+    parts = {"stiffness": held(model)} if joint == "open" else {}
+    assert against_differences(model, tmp_path, groups, **parts) < DIFFERENT
 
 
 def test_derivative_of_a_rotating_wave(tmp_path):
