@@ -3,7 +3,7 @@
 module fw_mistuned_modes
    use fw_body, only: body_type
    use fw_closed_joint, only: closed_joint
-   use fw_closed_pairs, only: add_springs
+   use fw_closed_pairs, only: add_springs, is_held, takes_part
    use fw_cyclic_data, only: nodal_matrices
    use fw_deviation, only: mass_part, stiffness_part
    use fw_error, only: error_type, fatal_error, status_input
@@ -99,12 +99,11 @@ contains
          allocate (rows%stiffness(0, n))
          do c = 1, 3
             do i = 1, n_pairs
-               if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
+               if (.not. takes_part(contact, i, c)) cycle
                rows%side_1 = [rows%side_1, contact%side_1(c, i)]
                rows%side_2 = [rows%side_2, contact%side_2(c, i)]
                rows%sector_2 = [rows%sector_2, contact%sector_2(i)]
-               rows%is_held = [rows%is_held, law%prediction%takes(i) .or. &
-                               law%prediction%order_of(i, c) > 0]
+               rows%is_held = [rows%is_held, is_held(contact, law, i, c)]
                own = [(law%prediction%stiffness(i + (j - 1)*n_pairs, c), j=1, n)]
                allocate (longer(size(rows%side_1), n))
                longer(:size(longer, 1) - 1, :) = rows%stiffness

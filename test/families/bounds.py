@@ -135,7 +135,7 @@ def judged(case, u, values, ends, seed, found):
 
 
 def is_answer(judge, omega, reached, end, value):
-    """Whether the straight way from the middle, or a solution nearby, leads to a value at an end."""
+    """Whether the way from the middle, or a solution nearby, leads to a value at an end."""
     nearest = sorted(reached, key=lambda known: np.abs(known[0] - end).max())
     middle, own = reached[0]
     ways = (lambda: judge.follow(omega, own, end), lambda: judge.walk(omega, middle, own, end),

@@ -346,3 +346,17 @@ def test_events_are_refused_where_nothing_has_any(tmp_path):
 def test_mu_with_a_table_has_no_derivative(tmp_path):
     case = {**chain(**TABLE), "sensitivity": {"parameters": ["contact%mu"]}}
     assert "has no derivative by mu" in run(tmp_path, case, status=3).stderr
+
+
+@pytest.mark.parametrize("mistuned", [None, True])
+def test_closed_modes_hold_what_a_curve_presses(tmp_path, mistuned):
+    """A curve has no stiffness at rest: closed is its limit, a mass that does not move."""
+    groups = {"case": {"analysis": "modes"},
+              "model": {"n_dof": 2, "mass": np.eye(2), "stiffness": [[2.0, -1.0], [-1.0, 2.0]]},
+              "contact": {"n_pairs": 1, "law": "penalty", "side_1": [0, 0, 1], "mu": 0.0,
+                          "normal_law": "power", "normal_coefficient": 40.0,
+                          "normal_exponent": 1.5}}
+    if mistuned:
+        groups["cyclic"] = {"n_sectors": 3, "engine_order": 0, "mistuned": True}
+    run(tmp_path, groups)
+    assert read(tmp_path / "case.h5")["modes/closed"][0, 0] == pytest.approx(np.sqrt(2.0), rel=1e-9)

@@ -331,3 +331,18 @@ def test_integration_in_time_agrees(tmp_path, law):
         # Of rigid pairs the steps have it to first order: 6e-3.
         assert np.abs(getattr(found, name) - heat).max() < (
             2e-2 if law == "dlft" else 1e-3) * np.abs(heat).max()
+
+
+@pytest.mark.parametrize("law", ["penalty", "dlft"])
+def test_closed_modes_are_free_along_a_side_that_slides(tmp_path, law):
+    stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    groups = {"case": {"analysis": "modes"},
+              "model": {"n_dof": 2, "mass": np.eye(2), "stiffness": stiffness},
+              "contact": {"n_pairs": 1, "law": law, "side_1": [1, 0, 2], "mu": 0.3,
+                          "sliding": "steady", "speed_1": 1.0}}
+    if law == "penalty":
+        groups["contact"] |= {"tangential_stiffness": 30.0, "normal_stiffness": 4.0}
+    run(tmp_path, groups)
+    wanted = np.sqrt(np.linalg.eigvalsh(stiffness + np.diag([0.0, 4.0]))[0]) \
+        if law == "penalty" else np.sqrt(2.0)
+    assert read(tmp_path / "case.h5")["modes/closed"][0, 0] == pytest.approx(wanted, rel=1e-9)
