@@ -14,6 +14,7 @@ import pytest
 from project import ROOT
 from test_import_calculix import WRITTEN, frequencies, run_import
 
+import fretwear as fw
 from fretwear.cli import main
 from fretwear.importer.deck import read_deck
 from fretwear.importer.meshes import read_mesh_file
@@ -96,6 +97,32 @@ def test_frequencies_are_those_of_the_cyclic_symmetry_of_calculix(
         own = min(float(words[3]) for words in table
                   if len(words) == 6 and words[0] == str(k) and words[1].isdigit())
         assert found[k, 0] == pytest.approx(own, rel=WRITTEN)
+
+
+def test_shrouds(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The commands of the page: pairs are the whole face of the shroud, and move alike in nodal
+    diameters and in a sector with its interfaces."""
+    monkeypatch.chdir(folder)
+    text, = re.findall(r"^    fretwear import (shroud\.msh (?:.*\\\n)*.*)$", PAGE.read_text(),
+                       re.MULTILINE)
+    words = text.replace("\\\n", " ").split()
+    assert run_import("-q", *words) == 0
+    words = [word for word in words if word not in ("--ccx", "--material", "--by-diameter",
+                                                    "210000,0.3,7.85e-9")]
+    assert run_import("-q", "shroud_ccx.inp", "--contact-mesh", *words[:-1], "whole.h5") == 0
+    found = {}
+    for name in ("shroud.h5", "whole.h5"):
+        with h5py.File(name) as file:
+            assert file["contact/area"][()].sum() == pytest.approx(36.0, rel=1e-6)
+            assert np.abs(file["contact/gap"][()]).max() < 1e-6
+        result = fw.frf(name, 1900, 2300, 2, unit="Hz", cyclic={"engine_order": 2},
+                        structure={"modal_damping": 1e-3}, contact={
+                            "law": "penalty", "tangential_stiffness": 2e4,
+                            "normal_stiffness": 5e4, "gap": -2e-2})
+        assert result.converged.all()
+        found[name] = result.amplitude[:, 0]
+    # Of two bases of twelve modes (measured 2e-4).
+    assert found["whole.h5"] == pytest.approx(found["shroud.h5"], rel=2e-3)
 
 
 #: A box of tetrahedra, or by layers of wedges or hexahedra.
