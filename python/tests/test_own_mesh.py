@@ -100,29 +100,20 @@ def test_frequencies_are_those_of_the_cyclic_symmetry_of_calculix(
 
 
 def test_shrouds(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The commands of the page: pairs are the whole face of the shroud, and move alike in nodal
-    diameters and in a sector with its interfaces."""
+    """The commands of the page: pairs are the whole face of the shroud, which is not tied."""
     monkeypatch.chdir(folder)
     text, = re.findall(r"^    fretwear import (shroud\.msh (?:.*\\\n)*.*)$", PAGE.read_text(),
                        re.MULTILINE)
-    words = text.replace("\\\n", " ").split()
-    assert run_import("-q", *words) == 0
-    words = [word for word in words if word not in ("--ccx", "--material", "--by-diameter",
-                                                    "210000,0.3,7.85e-9")]
-    assert run_import("-q", "shroud_ccx.inp", "--contact-mesh", *words[:-1], "whole.h5") == 0
-    found = {}
-    for name in ("shroud.h5", "whole.h5"):
-        with h5py.File(name) as file:
-            assert file["contact/area"][()].sum() == pytest.approx(36.0, rel=1e-6)
-            assert np.abs(file["contact/gap"][()]).max() < 1e-6
-        result = fw.frf(name, 1900, 2300, 2, unit="Hz", cyclic={"engine_order": 2},
-                        structure={"modal_damping": 1e-3}, contact={
-                            "law": "penalty", "tangential_stiffness": 2e4,
-                            "normal_stiffness": 5e4, "gap": -2e-2})
-        assert result.converged.all()
-        found[name] = result.amplitude[:, 0]
-    # Of two bases of twelve modes (measured 2e-4).
-    assert found["whole.h5"] == pytest.approx(found["shroud.h5"], rel=2e-3)
+    assert run_import("-q", *text.replace("\\\n", " ").split()) == 0
+    with h5py.File("shroud.h5") as file:
+        assert file["contact/area"][()].sum() == pytest.approx(36.0, rel=1e-6)
+        assert np.abs(file["contact/gap"][()]).max() < 1e-6
+        n = len(file["contact/side_1"])
+    result = fw.frf("shroud.h5", 1900, 2300, 2, unit="Hz", cyclic={"engine_order": 2},
+                    structure={"modal_damping": 1e-3}, contact={
+                        "law": "penalty", "tangential_stiffness": 2e4, "normal_stiffness": 5e4,
+                        "gap": -2e-2})
+    assert result.converged.all() and n >= 4
 
 
 #: A box of tetrahedra, or by layers of wedges or hexahedra.
