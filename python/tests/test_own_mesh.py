@@ -14,6 +14,7 @@ import pytest
 from project import ROOT
 from test_import_calculix import WRITTEN, frequencies, run_import
 
+import fretwear as fw
 from fretwear.cli import main
 from fretwear.importer.deck import read_deck
 from fretwear.importer.meshes import read_mesh_file
@@ -96,6 +97,23 @@ def test_frequencies_are_those_of_the_cyclic_symmetry_of_calculix(
         own = min(float(words[3]) for words in table
                   if len(words) == 6 and words[0] == str(k) and words[1].isdigit())
         assert found[k, 0] == pytest.approx(own, rel=WRITTEN)
+
+
+def test_shrouds(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The commands of the page: pairs are the whole face of the shroud, which is not tied."""
+    monkeypatch.chdir(folder)
+    text, = re.findall(r"^    fretwear import (shroud\.msh (?:.*\\\n)*.*)$", PAGE.read_text(),
+                       re.MULTILINE)
+    assert run_import("-q", *text.replace("\\\n", " ").split()) == 0
+    with h5py.File("shroud.h5") as file:
+        assert file["contact/area"][()].sum() == pytest.approx(36.0, rel=1e-6)
+        assert np.abs(file["contact/gap"][()]).max() < 1e-6
+        n = len(file["contact/side_1"])
+    result = fw.frf("shroud.h5", 1900, 2300, 2, unit="Hz", cyclic={"engine_order": 2},
+                    structure={"modal_damping": 1e-3}, contact={
+                        "law": "penalty", "tangential_stiffness": 2e4, "normal_stiffness": 5e4,
+                        "gap": -2e-2})
+    assert result.converged.all() and n >= 4
 
 
 #: A box of tetrahedra, or by layers of wedges or hexahedra.
