@@ -382,8 +382,8 @@ contains
 
       associate (way => to%t - from%t)
          mean = 0.5_wp*dot_product(from%slope + to%slope, way)
-         ! A kink between both says as much at most.
-         most = 0.5_wp*(abs(dot_product(from%slope, way)) + abs(dot_product(to%slope, way)))
+         ! A kink between both says half as much at most.
+         most = abs(dot_product(from%slope, way)) + abs(dot_product(to%slope, way))
       end associate
       jumps = abs(to%value - from%value - mean) > most + enough*abs(from%value)
    end function jumps

@@ -14,11 +14,11 @@ from house_numbers import numbers
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
     "lines of src": (115500, 1000),
-    "files of src": (489, 10),
+    "files of src": (493, 10),
     "lines of the longest file": (802, 50),
-    "modules used by one file, at most": (33, 2),
+    "modules used by one file, at most": (34, 2),
     "files that name forces%pairs": (42, 0),
-    "files that name case_type": (63, 0),
+    "files that name case_type": (64, 0),
     "files that name an analysis": (5, 0),
     "files with select type": (19, 0),
 }
