@@ -113,8 +113,8 @@ module fw_remark_table
                   'campbell: frequencies near a crossing were not solved: its peak may be '// &
                   'missed'), &
       remark_kind('bounds without solution', &
-                  'bounds: residual tractions without a solution are no ends of the range, '// &
-                  'which may be wider'), &
+                  'bounds: residual tractions lie behind a fold of the response; the range is '// &
+                  'of those that a straight way from the middle leads to'), &
       remark_kind('population peaks', &
                   'population: maxima between rows took too many solutions: the largest '// &
                   'amplitude solved stands for them'), &

@@ -299,12 +299,15 @@ def test_jumps(tmp_path):
         assert np.abs(depth - exact)[flown].max() <= stated
 
 
-def same(found, expected):
+def same(found, expected, round_off=0.0):
     """All datasets, and the attributes but for the clock's."""
     assert set(found) == set(expected)
     for name in set(expected) - CLOCK - {"wear"}:
         if expected[name].dtype == object:
             assert found[name].tolist() == expected[name].tolist(), name
+        elif round_off > 0.0 and expected[name].dtype.kind == "f":
+            size = np.abs(expected[name]).max(initial=0.0)
+            assert np.allclose(found[name], expected[name], 0.0, round_off * size, True), name
         else:
             assert found[name].tobytes() == expected[name].tobytes(), name
     assert found["wear"] == expected["wear"]
@@ -331,7 +334,8 @@ def test_killed_within_a_flight(tmp_path):
     part = read(tmp_path / "part.h5")
     assert 6 <= len(part["omega"]) < len(whole["omega"])
     again = result(tmp_path, groups, "--restart", "part.h5", name="again")
-    same(again, whole)
+    # Some kernels of OpenBLAS round by where memory lies, which a continued run lays out anew.
+    same(again, whole, round_off=1e-12)
 
 
 def test_fewer_flights_than_were_flown(tmp_path):

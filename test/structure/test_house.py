@@ -13,7 +13,7 @@ from house_numbers import numbers
 
 #: Number: its limit, and how far below the count may lie before the limit has to follow.
 LIMITS = {
-    "lines of src": (115500, 1000),
+    "lines of src": (116200, 1000),
     "files of src": (493, 10),
     "lines of the longest file": (802, 50),
     "modules used by one file, at most": (34, 2),
