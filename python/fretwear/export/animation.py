@@ -132,7 +132,7 @@ def _need_pyvista() -> Any:
     try:
         import pyvista
     except ImportError:
-        raise InputError("animations need pyvista: pip install 'fretwear[pyvista]'") from None
+        raise InputError("animations need pyvista: pip install pyvista") from None
     return pyvista
 
 
