@@ -179,24 +179,25 @@ def left_by_a_kill(case: fw.Case, rows: int, folder: Path) -> Path:
     return folder / "killed.h5.part"
 
 
-#: A sweep long enough to be killed in its middle.
 LONG = fw.Case.from_file(EXAMPLE / "blade_sector" / "frf.nml",
                          harmonics={"n_harmonics": 3, "n_time": 64}, sweep={"n_points": 401})
 
 
 def test_a_killed_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the rows that are there, with all maxima."""
-    left = left_by_a_kill(LONG, 250, tmp_path)
+    # Progress is told from time to time: long enough for its middle not to be the end.
+    long = LONG.replace(sweep={"n_points": 2401})
+    left = left_by_a_kill(long, 250, tmp_path)
     with h5py.File(left) as file:
         n_rows = len(file["omega"])
     # What was not flushed is lost: up to twenty times what a flush takes.
-    assert 100 <= n_rows < 401
+    assert 100 <= n_rows < 2401
     solved: list[int] = []
     monkeypatch.setattr(running, "_part", counted(running._part, solved))
-    again = fw.run(LONG, in_memory=True, restart=left)
+    again = fw.run(long, in_memory=True, restart=left)
     # Of those that are there four at the end, and seven around each maximum.
-    assert sum(solved) <= 401 - n_rows + 4 + 7 * len(solved[1:])
-    assert_same_sweep(fw.run(LONG, in_memory=True), again)
+    assert sum(solved) <= 2401 - n_rows + 4 + 7 * len(solved[1:])
+    assert_same_sweep(fw.run(long, in_memory=True), again)
 
 
 def test_few_rows_are_solved_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

