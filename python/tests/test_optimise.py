@@ -167,14 +167,19 @@ def test_several_parameters() -> None:
         assert evaluate(found.values * step).value > found.value
 
 
-def test_two_peaks_of_one_height() -> None:
-    """An absorber: its best stiffness makes both peaks equal, where the slope jumps."""
+def absorber(end: float) -> fw.Case:
+    """Two masses, joined by a pair that sticks, in a sweep up to a frequency."""
     contact = fw.ContactPairs([[1, 0, 0]], [[2, 0, 0]], mu=1.0, normal_load=1e6,
                               tangential_stiffness=0.09)
     model = fw.Model([[1.0, 0.0], [0.0, 0.1]], [[0.05, -0.03], [-0.03, 0.03]],
                      [[1.0, 0.0], [0.0, 0.0]], cosine=[1.0, 0.0], contact=contact)
-    case = fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 1},
-                   sweep={"start": 0.6, "end": 1.4, "n_points": 81})
+    return fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 1},
+                   sweep={"start": 0.6, "end": end, "n_points": 81})
+
+
+def test_two_peaks_of_one_height() -> None:
+    """An absorber: its best stiffness makes both peaks equal, where the slope jumps."""
+    case = absorber(1.4)
     found = fw.optimise(case, minimise="max_amplitude[u1]", over="contact%tangential_stiffness",
                         bounds=(0.02, 0.5))
     assert found.converged and found.word.startswith("optimum at a corner")
@@ -197,6 +202,13 @@ def test_two_peaks_of_one_height() -> None:
     best = found.values[0]
     assert found.value == pytest.approx(height(best), rel=1e-8)
     assert height(best) < min(height(best * 1.0001), height(best / 1.0001))
+
+
+def test_a_peak_beyond_the_sweep_is_told() -> None:
+    """The end of the sweep stands for the second peak: on one side of the corner at least."""
+    found = fw.optimise(absorber(1.03), minimise="max_amplitude[u1]",
+                        over="contact%tangential_stiffness", bounds=(0.02, 0.5))
+    assert "at an end" in str(found), found.remarks
 
 
 def test_optimum_at_a_bound() -> None:

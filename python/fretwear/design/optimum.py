@@ -58,7 +58,7 @@ class Optimum:
     n_solutions : int
         Solutions of the balance that they took.
     remarks : tuple of str
-        What was remarked at the optimum.
+        What was remarked at the optimum, and on both sides of a corner.
     case : Case
         The case at the optimum.
     """
@@ -164,12 +164,14 @@ def optimise(case: Case | str, *, minimise: Objective | None = None,
     first = None if start is None else np.atleast_1d(np.array(start, dtype=float)).tolist()
     end = search.run(unknowns.start(first))
     best = end.best
+    # At a corner the other side may have its peak at an end of the sweep.
+    remarks = dict.fromkeys(text for one in (best, *end.sides) for text in one.remarks)
     return Optimum(
         what if isinstance(what, str) else "objective", unknowns.names, best.parameters,
         best.value, best.gradient, end.size, end.sides, best.omega,
         end.word.startswith("optimum"), end.word, end.doubt, search.history, search.failures,
         len(search.history) + len(search.failures), sum(one.solved for one in search.history),
-        best.remarks, unknowns.case_at(best.parameters))
+        tuple(remarks), unknowns.case_at(best.parameters))
 
 
 class _Lines:
