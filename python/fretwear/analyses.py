@@ -362,4 +362,4 @@ def _failure(result: Result, report: list[str]) -> str:
         return f"{result.name}: the run ended early: {'; '.join(report[:1])}"
     where = ", ".join(f"{omega:.6g}" for omega in failed[:5]) + (", ..." if len(failed) > 5 else "")
     return (f"{result.name}: {len(failed)} of {result.n_points} points did not converge, at omega "
-            f"= {where} rad/s; try other settings of solver and harmonics, or a finer sweep")
+            f"= {where} rad/s; try a finer sweep, or other harmonics; fw_run --explain says why")
