@@ -182,6 +182,8 @@ contains
          ! From different ways: neighbours on one lead to one end.
          do k = 1, min(most_descents, size(is_used))
             at = best_of(self, side, is_used)
+            ! Folds may leave fewer ways with a response.
+            if (at == 0) exit
             is_used(self%known(at)%way) = .true.
             call self%descend(solver, side, at, error)
             if (allocated(error)) return
