@@ -1,6 +1,6 @@
-!> What the joint of a case is where it is closed: linear springs, and pairs that stick, at a gap or
-!> not. Elastic pairs are their springs; of all others the rows do not move. A pressure along a
-!> curve has no stiffness before it is known: closed is its limit, a row that does not move. What
+!> What the joint of a case is where it is closed: linear springs, and pairs that stick, those with
+!> a gap too. Elastic pairs are their springs; of all others the rows do not move. A pressure along
+!> a curve has no stiffness before it is known: closed is its limit, a row that does not move. What
 !> slides steadily is not held along its surface.
 module fw_closed_pairs
    use fw_closed_joint, only: closed_joint

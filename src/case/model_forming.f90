@@ -2,6 +2,7 @@
 !> and modal damping, factors, and the derivatives by these that are wanted.
 module fw_model_forming
    use fw_cyclic_data, only: speed_matrices
+   use fw_damping, only: difference_place, difference_step, difference_weight
    use fw_error, only: error_type
    use fw_kinds, only: pi, wp
    use fw_model, only: matrix_change, model_type
@@ -16,12 +17,6 @@ module fw_model_forming
 
    public :: model_origin, find_changes, form_structure, form_matrices, finish_structure
    public :: goes_alone
-
-   !> Step of the difference of the modal damping over stiffness or mass. Of fourth order: its error
-   !> is the fourth power of the step, and what it makes of round-off is as small.
-   real(wp), parameter :: step = 1.0e-3_wp
-   integer, parameter :: place(4) = [-2, -1, 1, 2]
-   real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp]/12.0_wp
 
    !> What a model is made of, to make it again with other options.
    type :: model_origin
@@ -294,11 +289,11 @@ contains
       real(wp) :: h
       integer :: k
 
-      h = step*change%value
+      h = difference_step*change%value
       allocate (moved, source=model)
-      do k = 1, size(place)
-         moved%mass = model%mass + place(k)*h*change%mass
-         call damp_structure(moved, model%stiffness, weight(k)/h*options%modal_damping, &
+      do k = 1, size(difference_place)
+         moved%mass = model%mass + difference_place(k)*h*change%mass
+         call damp_structure(moved, model%stiffness, difference_weight(k)/h*options%modal_damping, &
                              change%damping, error, 2.0_wp*pi*options%modal_damping_up_to)
          if (allocated(error)) return
       end do
@@ -339,15 +334,15 @@ contains
       real(wp) :: h, speed
       integer :: k, n
 
-      h = step*options%rotation_speed
+      h = difference_step*options%rotation_speed
       n = growth%n_powers()
-      do k = 1, size(place)
-         speed = options%rotation_speed + place(k)*h
+      do k = 1, size(difference_place)
+         speed = options%rotation_speed + difference_place(k)*h
          stiffness = model%stiffness
          call growth%add_stiffness(even_powers(speed, n) - even_powers(options%rotation_speed, n), &
                                    stiffness)
-         call damp_structure(model, stiffness, weight(k)/h*options%modal_damping, damping, &
-                             error, 2.0_wp*pi*options%modal_damping_up_to)
+         call damp_structure(model, stiffness, difference_weight(k)/h*options%modal_damping, &
+                             damping, error, 2.0_wp*pi*options%modal_damping_up_to)
          if (allocated(error)) return
       end do
    end subroutine change_modal_damping

@@ -49,7 +49,8 @@ contains
       call to%put('/bounds/solved', self%counts(1, :), '', 'point', &
                   'responses that were solved, the centre among them')
       call to%put('/bounds/failed', self%counts(2, :), '', 'point', &
-                  'residual tractions without a solution, which are no ends')
+                  'residual tractions behind a fold of the response, or without a solution, '// &
+                  'which are no ends')
       call to%note('/', 'bounds_quantity', trim(quantity_words(self%quantity)))
    end subroutine write_bounds
 

@@ -40,7 +40,8 @@ contains
       call to%put('/ringdown/omega', self%omega, 'rad/s', 'half_swing', &
                   'pi over the time from one extreme to the next')
       call to%put('/ringdown/damping_ratio', self%damping_ratio, '1', 'inner_half_swing', &
-                  'logarithmic decrement from the half swing before to the one behind, over 2 pi')
+                  'd/sqrt(4 pi**2 + d**2), d the logarithmic decrement from the half swing '// &
+                  'before to the one behind')
       call to%note('/ringdown', 'stuck_omega', self%stuck_omega)
    end subroutine write_ringdown
 

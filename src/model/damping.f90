@@ -14,10 +14,18 @@ module fw_damping
    private
 
    public :: add_modal_damping
+   ! For other modes than those of M and K alone, and for derivatives by what they depend on.
+   public :: multiply, rank_tolerance, difference_step, difference_place, difference_weight
 
    !> Eigenvalues below this share of the largest count as zero: round-off of an order 1000
    !> matrix stays well below, a physical mass or stiffness ratio well above.
    real(wp), parameter :: rank_tolerance = 1.0e-12_wp
+   !> Difference of the damping over stiffness or mass: the step, as a share of these, and the
+   !> places in steps with their weights. Of fourth order: its error is the fourth power of the step, and
+   !> what it makes of round-off is as small.
+   real(wp), parameter :: difference_step = 1.0e-3_wp
+   integer, parameter :: difference_place(4) = [-2, -1, 1, 2]
+   real(wp), parameter :: difference_weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp]/12.0_wp
    !> Squares of the lowest frequencies below this share of the bound count as zero: the shift by
    !> which they are found leaves round-off of itself.
    real(wp), parameter :: zero_square = 1.0e-10_wp

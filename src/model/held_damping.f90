@@ -6,18 +6,14 @@
 !> with C_v the modal damping of v. Where B^T M B is singular, so is M in the directions that it
 !> lacks, and a pseudo-inverse leaves them out of X as they are left out of C_v.
 module fw_held_damping
-   use fw_damping, only: add_modal_damping
+   use fw_damping, only: add_modal_damping, multiply, rank_tolerance
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_lapack, only: dgemm
    use fw_linalg, only: diagonalize
    implicit none (type, external)
    private
 
    public :: add_held_damping
-
-   !> Eigenvalues below this share of the largest are massless directions, as in fw_damping.
-   real(wp), parameter :: rank_tolerance = 1.0e-12_wp
 
 contains
 
@@ -103,19 +99,5 @@ contains
          matrix(j, :j - 1) = matrix(:j - 1, j)
       end do
    end subroutine share_round_off
-
-   !> c = op(a) op(b), op: 'N' as it is, 'T' transposed.
-   subroutine multiply(op_a, a, op_b, b, c)
-      character, intent(in) :: op_a, op_b
-      real(wp), contiguous, intent(in) :: a(:, :), b(:, :)
-      real(wp), allocatable, intent(out) :: c(:, :)
-      integer :: m, n, k
-
-      m = size(a, merge(1, 2, op_a == 'N'))
-      k = size(a, merge(2, 1, op_a == 'N'))
-      n = size(b, merge(2, 1, op_b == 'N'))
-      allocate (c(m, n))
-      call dgemm(op_a, op_b, m, n, k, 1.0_wp, a, size(a, 1), b, size(b, 1), 0.0_wp, c, m)
-   end subroutine multiply
 
 end module fw_held_damping

@@ -5,6 +5,7 @@
 !> with T of fw_sector. Damping of modes follows the mass: each nodal diameter has its own modes.
 module fw_sector_changes
    use fw_cyclic_data, only: nodal_matrices
+   use fw_damping, only: difference_place, difference_step, difference_weight
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: model_type
@@ -19,12 +20,6 @@ module fw_sector_changes
       !> Of mass and damping (n, n), and of the static load (n).
       complex(wp), allocatable :: mass(:, :), damping(:, :), load(:)
    end type nodal_change
-
-   !> Step of the difference of the modal damping over the mass. Of fourth order: its error is the
-   !> fourth power of the step, and what it makes of round-off is as small.
-   real(wp), parameter :: step = 1.0e-3_wp
-   integer, parameter :: place(4) = [-2, -1, 1, 2]
-   real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp]/12.0_wp
 
 contains
 
@@ -71,15 +66,17 @@ contains
       type(nodal_change), intent(inout) :: change
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices) :: moved
+      real(wp) :: h
       integer :: i
 
-      do i = 1, size(place)
-         moved%mass = nodal%mass + place(i)*step*mass*change%mass
+      h = difference_step*mass
+      do i = 1, size(difference_place)
+         moved%mass = nodal%mass + difference_place(i)*h*change%mass
          moved%stiffness = nodal%stiffness
          if (allocated(moved%damping)) deallocate (moved%damping)
          call damp_modes(model, k, model%cyclic%modal_damping, moved, error)
          if (allocated(error)) return
-         change%damping = change%damping + weight(i)/(step*mass)*moved%damping
+         change%damping = change%damping + difference_weight(i)/h*moved%damping
       end do
    end subroutine follow_modes
 
