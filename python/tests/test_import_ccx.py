@@ -176,18 +176,23 @@ def test_without_calculix_the_deck_is_there(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_run_that_fails(ccx: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What CalculiX says is quoted; old matrices do not stand in for it."""
+    """What CalculiX says is quoted; old matrices do not stand in for it, and are not lost."""
     ccx.write_text("#!/bin/sh\necho ' *ERROR in e_c3d: nonpositive jacobian'\nexit 201\n")
     write_mesh(through_cracks(), tmp_path / "ring.msh")
     for end in ("sti", "mas", "dof"):
-        (tmp_path / f"own.{end}").write_text("")
+        (tmp_path / f"own.{end}").write_text("of before")
     (tmp_path / "own.inp").write_text("*NODE\n1, 0, 0, 0\n")
     for command in (["ring.msh", "--material", MATERIAL], ["own.inp"]):
         assert main(["import", str(tmp_path / command[0]), "--ccx", *command[1:], "--check"]) == 3
         said = capsys.readouterr().err
         assert "status 201" in said and "nonpositive jacobian" in said
-    assert not (tmp_path / "own.sti").exists()
     ccx.write_text("#!/bin/sh\nexit 0\n")
     assert main(["import", str(tmp_path / "own.inp"), "--ccx", "--check"]) == 3
     assert "SOLVER=MATRIXSTORAGE" in capsys.readouterr().err
+    ccx.write_text("no program")
+    assert main(["import", str(tmp_path / "own.inp"), "--ccx", "--check"]) == 3
+    assert "cannot be started" in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.glob("own.*")) == [
+        "own.dof", "own.inp", "own.mas", "own.sti"]
+    assert (tmp_path / "own.sti").read_text() == "of before"
     assert os.environ["PATH"] == str(ccx.parent)

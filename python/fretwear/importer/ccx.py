@@ -229,10 +229,29 @@ def _run(deck: Path, folder: Path, shown: Path, quiet: bool) -> None:
                          f"import {shown.name} without --ccx")
     if not quiet:
         print(f"ccx {shown.stem}: makes the matrices", file=sys.stderr)
-    for end in SUFFIXES:
-        deck.with_suffix(end).unlink(missing_ok=True)
-    done = subprocess.run([program, deck.stem], cwd=folder, capture_output=True, text=True,
-                          errors="replace", check=False)
+    # Matrices of an earlier run must not pass for those of this one, and come back where it fails.
+    kept = {end: deck.with_suffix(end + ".before") for end in SUFFIXES
+            if deck.with_suffix(end).is_file()}
+    for end, aside in kept.items():
+        deck.with_suffix(end).replace(aside)
+    try:
+        _store(program, deck, folder, shown)
+    except BaseException:
+        for end, aside in kept.items():
+            aside.replace(deck.with_suffix(end))
+        raise
+    for aside in kept.values():
+        aside.unlink()
+
+
+def _store(program: str, deck: Path, folder: Path, shown: Path) -> None:
+    """Run CalculiX, and see that it has stored all."""
+    try:
+        done = subprocess.run([program, deck.stem], cwd=folder, capture_output=True, text=True,
+                              errors="replace", check=False)
+    except OSError as error:
+        raise InputError(f"--ccx: {program} cannot be started ({error.strerror}); install it anew "
+                         "(Debian: apt install calculix-ccx)") from error
     missing = [end for end in SUFFIXES if not deck.with_suffix(end).is_file()]
     if done.returncode or missing:
         said = (done.stdout + done.stderr).splitlines()
