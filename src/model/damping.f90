@@ -21,8 +21,8 @@ module fw_damping
    !> matrix stays well below, a physical mass or stiffness ratio well above.
    real(wp), parameter :: rank_tolerance = 1.0e-12_wp
    !> Difference of the damping over stiffness or mass: the step, as a share of these, and the
-   !> places in steps with their weights. Of fourth order: its error is the fourth power of the step, and
-   !> what it makes of round-off is as small.
+   !> places in steps with their weights. Of fourth order: its error is the fourth power of the
+   !> step, and what it makes of round-off is as small.
    real(wp), parameter :: difference_step = 1.0e-3_wp
    integer, parameter :: difference_place(4) = [-2, -1, 1, 2]
    real(wp), parameter :: difference_weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp]/12.0_wp
